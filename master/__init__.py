@@ -1,0 +1,1 @@
+"""Master: scenes, FMU export, energy-consistent co-simulation, reports."""

@@ -1,0 +1,112 @@
+"""The command line: `pipelay`, or `python -m master`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from master import commands
+from master.errors import RunError, UsageError
+from master.interrupts import breakable
+
+EPILOG = """examples:
+  pipelay run                                  the paper's scene, 300 s; results in results/paper
+  pipelay run pipelay -o out                   the same with the seabed under the pipe
+  pipelay run --set simulation.duration=60 --set vessel.controller.x=790
+  pipelay run my-scene.toml                    a scene of your own; start from a copy of a built-in one
+  pipelay statics paper --json                 the equilibrium alone, as JSON
+  pipelay export -o fmus --scene pipelay       pipe.fmu and vessel.fmu for any FMI 2.0 master
+  pipelay scenes                               what is built in
+
+exit codes: 0 done and the energy check kept; 1 the computation failed or the energy check did; 2 a mistake in the call
+or the scene, named in one line."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The commands and their options."""
+    raw = argparse.RawDescriptionHelpFormatter
+    about = "A geometrically exact offshore pipe and its vessel as two FMUs, coupled with an energy-checked master."
+    top = argparse.ArgumentParser("pipelay", description=about, epilog=EPILOG, formatter_class=raw)
+    subparsers = top.add_subparsers(metavar="COMMAND", required=True)
+
+    def command(name: str, function: commands.Command, short: str, epilog: str) -> argparse.ArgumentParser:
+        added = subparsers.add_parser(name, help=short, description=short, epilog=epilog, formatter_class=raw)
+        added.set_defaults(command=function)
+        return added
+
+    run = command(
+        "run",
+        commands.run,
+        "Simulate a scene; write signals, shapes, figures and a summary.",
+        "files written: signals.csv, shapes.npz, fig3_*.png to fig9_*.png, energy.png, summary.json\n\n"
+        "Ctrl-C ends a run early and keeps what was computed.",
+    )
+    _scene_arguments(run, optional=True)
+    run.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the results (default: results/SCENE)")
+
+    statics = command(
+        "statics",
+        commands.statics,
+        "Find the static equilibrium of a scene and print its forces.",
+        "Forces and moments act on the pipe; components are x forward, y starboard, z down.",
+    )
+    _scene_arguments(statics, optional=False)
+    statics.add_argument("--json", action="store_true", help="print JSON, with arrays over the nodes")
+
+    export = command(
+        "export",
+        commands.export,
+        "Write the units of a scene as FMUs (FMI 2.0 co-simulation).",
+        "The equilibrium of the scene is built in as the start of both FMUs.",
+    )
+    export.add_argument("--scene", default="paper", metavar="SCENE", help="scene the FMUs belong to (default: paper)")
+    _set_argument(export)
+    export.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path(), help="folder (default: here)")
+
+    command(
+        "scenes", commands.scenes, "List the built-in scenes.", "Their files are in the package's folder master/scenes."
+    )
+    return top
+
+
+def _scene_arguments(to: argparse.ArgumentParser, *, optional: bool) -> None:
+    short = "a built-in name (see `pipelay scenes`) or a .toml file"
+    if optional:
+        to.add_argument("scene", nargs="?", default="paper", metavar="SCENE", help=f"{short} (default: paper)")
+    else:
+        to.add_argument("scene", metavar="SCENE", help=short)
+    _set_argument(to)
+
+
+def _set_argument(to: argparse.ArgumentParser) -> None:
+    about = "change one value of the scene: dotted key, TOML value; may be repeated"
+    to.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes", help=about)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; mistakes and failures become one line on the error stream."""
+    options = parser().parse_args(arguments)
+    try:
+        with breakable():
+            return int(options.command(options))
+    except UsageError as error:
+        return _complain(str(error), 2)
+    except RunError as error:
+        return _complain(str(error), 1)
+    except KeyboardInterrupt:
+        return _complain("interrupted", 1)
+    except BrokenPipeError:  # the reader of our output went away, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _complain(message: str, code: int) -> int:
+    sys.stderr.write(f"pipelay: {message}\n")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

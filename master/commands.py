@@ -1,0 +1,97 @@
+"""What each command does; a function returns the exit code, or raises UsageError or RunError for one line on screen."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from master import scene as scenes_of
+from master.errors import UsageError
+from master.prepared import prepare
+
+Command = Callable[[argparse.Namespace], int]
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate a scene; exit code 1 where it did not reach its end or the energy check failed."""
+    scene = scenes_of.load(options.scene, options.changes)
+    folder = _folder(options.output or Path("results") / scene.name)
+    from master.run import simulate  # matplotlib and FMPy take a second to import: not for `scenes` or a bad scene
+
+    result = simulate(scene, folder, sys.stderr)
+    _say(f"{result.screen}\nresults in {folder}")
+    return 0 if result.passed else 1
+
+
+def statics(options: argparse.Namespace) -> int:
+    """Print the coupled equilibrium of a scene."""
+    scene = scenes_of.load(options.scene, options.changes)
+    from master.statics import report  # works with the units' packages, which a run never imports
+
+    found = report(scene)
+    _say(json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found))
+    return 0
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write the FMUs of a scene into a folder."""
+    scene = scenes_of.load(options.scene, options.changes)
+    folder = _folder(options.output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryDirectory(dir=folder).cleanup()  # before the work, as a trial
+    except OSError as error:
+        raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
+    for path in prepare(scene, ["--export", str(folder)]).fmus.values():
+        _say(str(path))
+    return 0
+
+
+def scenes(options: argparse.Namespace) -> int:
+    """List the built-in scenes."""
+    found = scenes_of.built_in()
+    width = max(map(len, found))
+    for name, title in found.items():
+        _say(f"{name:{width}}  {title}")
+    return 0
+
+
+def _folder(path: Path) -> Path:
+    """`path`, if it is a folder or can become one."""
+    for place in (path, *path.parents):
+        if place.is_dir():
+            return path
+        if place.exists():
+            raise UsageError(f"--output = {str(path)!r}: {place} is a file, not a folder")
+    return path
+
+
+def _statics_table(scene: scenes_of.Scene, found: dict[str, Any]) -> str:
+    def kilo(key: str) -> str:
+        return "  ".join(f"{value / 1e3:10.3f}" for value in found[key])
+
+    touchdown = found["touchdown_s_m"]
+    return "\n".join(
+        (
+            f"Equilibrium of {scene.name}: {scene.sections.title}",
+            "on the pipe                  x           y           z",
+            f"  top force     {kilo('top_force_e_N')}  kN",
+            f"  top moment    {kilo('top_moment_e_N_m')}  kN m",
+            f"  foot force    {kilo('foot_force_e_N')}  kN",
+            f"  foot moment   {kilo('foot_moment_e_N_m')}  kN m",
+            f"  top tension     {found['top_tension_N'] / 1e3:.3f} kN",
+            f"  largest bending {found['largest_bending_moment_N_m'] / 1e3:.3f} kN m",
+            f"  stretch         {found['stretch_m']:.4f} m",
+            f"  lowest point    {found['lowest_point_m']:.3f} m",
+            f"  touchdown at    {'no seabed contact' if touchdown is None else f'S = {touchdown:.1f} m'}",
+        )
+    )
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")

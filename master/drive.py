@@ -1,0 +1,224 @@
+"""What moves the FMUs of a run: the pipe coupled with the vessel, or the pipe alone, its top moved as prescribed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from master.bond import hang_off, impedance_end, mobility_end
+from master.coupling import SMALLEST_STEP, Step, coupling
+from master.fmu import Fmu, Names, StepRejected
+from master.ledger import Columns, Ledger
+from master.prepared import Prepared
+from master.recorder import Source
+from master.scene import Sections
+from master.sections import Load, TopMotion, mean_load
+
+LOADS = ("environment_force", "environment_moment")
+SNAP = 1e-10  # of a step: a time this close to a multiple of it is that multiple; round-off does not add up
+Row = dict[tuple[str, str], float]
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Macro steps accepted and rejected, and steps asked of each unit."""
+
+    macro_steps: int = 0
+    rejected_steps: int = 0
+    pipe_solves: int = 0
+    vessel_solves: int = 0
+
+
+class Drive(Protocol):
+    """Initialised units at `time` [s], advanced by one accepted macro step at a time; the ledger is kept with every step."""
+
+    time: float
+    ledger: Ledger
+
+    @property
+    def units(self) -> Mapping[str, Fmu]:
+        """The FMUs by name."""
+
+    @property
+    def effort(self) -> Effort:
+        """What it cost so far."""
+
+    def advance(self, end: float) -> None:
+        """Take one step, not beyond `end` [s]. Raises RunError, of which EnergyCheckFailed is one."""
+
+    def derived(self) -> Row:
+        """Values to record that no port holds, by (name, unit)."""
+
+
+class Coupled:
+    """Pipe and vessel, joined at the hang-off point by an energy-consistent bond."""
+
+    def __init__(self, pipe: Fmu, vessel: Fmu, sections: Sections) -> None:
+        rules, bond = sections.coupling, hang_off()
+        self.time = 0.0
+        self.units: Mapping[str, Fmu] = {"pipe": pipe, "vessel": vessel}
+        self._clamped = sections.pipe.get("top") != "pinned"
+        self._pipe, self._vessel = impedance_end(pipe, bond), mobility_end(vessel, bond)
+        sources = [(pipe, columns(pipe, "top_work")), (vessel, columns(vessel, "bond_work"))]
+        self.ledger = Ledger(sources, rules.energy_check, rules.on_violation)
+        self._macro_step = sections.simulation.macro_step
+        self._coupling = coupling(rules.scheme, self._pipe, self._vessel, bond, self._macro_step, rules.tolerance, self.ledger.check)
+
+    @property
+    def effort(self) -> Effort:
+        """See `Drive`."""
+        done = self._coupling.counters
+        return Effort(done.steps, done.rejected_steps, self._pipe.solves, self._vessel.solves)
+
+    def advance(self, end: float) -> None:
+        """See `Drive`."""
+        step = self._coupling.advance(self.time, end - self.time)
+        self.time = _snapped(step.time + step.step, self._macro_step, end)
+
+    def derived(self) -> Row:
+        """See `Drive`."""
+        return pose_gap(self.units["pipe"], self.units["vessel"], self._clamped) | top_tension(self.units["pipe"])
+
+
+class Mover:
+    """The prescribed motion as the other end of the bond: what it supplies goes into the pipe. Reads like an FMU."""
+
+    name = "mover"
+    ports: Mapping[str, object] = dict.fromkeys(("supplied_work", "bond_work"))
+
+    def __init__(self) -> None:
+        self.supplied = 0.0
+
+    def port(self, name: str) -> object:
+        """Any port of `ports`."""
+        return self.ports[name]
+
+    def get(self, names: Names) -> np.ndarray:
+        """The work supplied from outside, and as much with the other sign through the bond [J]."""
+        sign = {"supplied_work": 1.0, "bond_work": -1.0}
+        return np.array([sign[name] * self.supplied for name in ((names,) if isinstance(names, str) else names)])
+
+
+class Prescribed:
+    """The pipe alone; mean velocities over each step are the exact change of the top's position over its length."""
+
+    def __init__(self, pipe: Fmu, motion: TopMotion, sections: Sections) -> None:
+        rules = sections.coupling
+        self.time = 0.0
+        self.units: Mapping[str, Fmu] = {"pipe": pipe}
+        self._pipe, self._motion, self._mover = impedance_end(pipe, hang_off()), motion, Mover()
+        mover = (self._mover, Columns(work=("supplied_work",), bond="bond_work"))
+        self.ledger = Ledger([(pipe, columns(pipe, "top_work")), mover], rules.energy_check, rules.on_violation)
+        self._macro_step = self._wanted = sections.simulation.macro_step
+        self._steps = self._rejected = 0
+
+    @property
+    def effort(self) -> Effort:
+        """See `Drive`."""
+        return Effort(self._steps, self._rejected, self._pipe.solves)
+
+    def advance(self, end: float) -> None:
+        """See `Drive`."""
+        step = min(self._wanted, end - self.time)
+        while not self._attempt(step):
+            self._rejected += 1
+            step = self._wanted = step / 2
+        self.time = _snapped(self.time + step, self._macro_step, end)
+        self._wanted = min(2.0 * self._wanted, self._macro_step)
+        self._steps += 1
+
+    def _attempt(self, step: float) -> bool:
+        """One step, kept if the pipe and the ledger accept it; a rejection of the smallest step is final and raised."""
+        flow = np.concatenate([self._motion.mean_velocity(self.time, step), np.zeros(3)])
+        before = self._mover.supplied
+        self._pipe.begin()
+        try:
+            effort = self._pipe.solve(self.time, step, flow)
+            self._mover.supplied = before - step * float(effort @ flow)
+            accepted = self.ledger.check(Step(self.time, step, flow, effort, 0.0, 1))
+        except StepRejected:
+            if step / 2.0 < SMALLEST_STEP * self._macro_step:
+                raise
+            accepted = False
+        if accepted:
+            self._pipe.commit()
+        else:
+            self._pipe.cancel()
+            self._mover.supplied = before
+        return accepted
+
+    def derived(self) -> Row:
+        """See `Drive`."""
+        return top_tension(self.units["pipe"])
+
+
+class LoadedFmu(Fmu):
+    """An FMU under the loads of a table, set as their mean over whatever step is asked for."""
+
+    rows: Sequence[Load] = ()
+
+    def step(self, time: float, step: float, final: bool = False) -> None:
+        """See `Fmu.step`."""
+        self.set(LOADS, np.concatenate(mean_load(self.rows, time, step)))
+        super().step(time, step, final)
+
+
+@contextmanager
+def open_drive(sections: Sections, prepared: Prepared) -> Iterator[Coupled | Prescribed]:
+    """Load and initialise the FMUs of a prepared scene. Raises FmuFailed."""
+    with ExitStack() as stack:
+
+        def load(unit: str, kind: type[Fmu] = Fmu) -> Fmu:
+            return stack.enter_context(kind(Path(prepared.fmus[unit]), unit))
+
+        pipe = load("pipe")
+        pipe.initialize(prepared.parameters["pipe"])
+        if sections.top_motion is not None:
+            yield Prescribed(pipe, sections.top_motion, sections)
+            return
+        vessel = load("vessel", LoadedFmu if sections.tables else Fmu)
+        if isinstance(vessel, LoadedFmu) and sections.tables:
+            vessel.rows = sections.tables.environment
+        pull = {name: pipe.get(name) for name in hang_off().efforts}
+        vessel.initialize(prepared.parameters["vessel"], inputs=pull)
+        yield Coupled(pipe, vessel, sections)
+
+
+def columns(fmu: Fmu, bond: str) -> Columns:
+    """The energy outputs of a unit by the endings of their names; `bond` is the work done on it through the bond."""
+
+    def ending(suffix: str) -> tuple[str, ...]:
+        return tuple(name for name in fmu.names("output") if name.endswith(suffix) and name != bond)
+
+    return Columns(ending("_energy"), ending("_work"), ending("_dissipation"), bond)
+
+
+def top_tension(pipe: Source) -> Row:
+    """Tension n_1 at the top: the force on the pipe there along the normal t1; the port holds the reaction."""
+    x, y, z, q0, q1, q2, q3 = pipe.get(("end_force", "top_quaternion")).tolist()
+    t1 = (1.0 - 2.0 * (q2 * q2 + q3 * q3), 2.0 * (q1 * q2 + q0 * q3), 2.0 * (q1 * q3 - q0 * q2))
+    return {("top_tension", "N"): -(x * t1[0] + y * t1[1] + z * t1[2])}
+
+
+def pose_gap(pipe: Source, vessel: Source, clamped: bool = True) -> Row:
+    """Distance [m] and, if `clamped`, angle [rad] between the two units' idea of the hang-off point's pose."""
+    held = pipe.get(("top_position", "top_quaternion"))
+    holding = vessel.get(("hang_off_position", "hang_off_quaternion"))
+    p, q = held[3:], holding[3:]
+    vector = p[0] * q[1:] - q[0] * p[1:] - np.cross(p[1:], q[1:])  # of conj(p) q: the sine of half the angle
+    angle = 2.0 * math.asin(min(1.0, float(np.linalg.norm(vector))))
+    return {("pose_gap", "m"): math.dist(held[:3], holding[:3])} | ({("pose_gap_angle", "rad"): angle} if clamped else {})
+
+
+def _snapped(time: float, step: float, end: float) -> float:
+    """`time`, or the multiple of `step` or the `end` that it misses by round-off only."""
+    for exact in (end, round(time / step) * step):
+        if abs(time - exact) < SNAP * step:
+            return exact
+    return time

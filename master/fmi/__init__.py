@@ -1,0 +1,1 @@
+"""FMI side of the units: parameter schema, PythonFMU adapter, FMU building."""

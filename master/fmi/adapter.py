@@ -1,0 +1,247 @@
+"""A unit as an FMI 2.0 co-simulation slave: ports, parameters, state and errors; no physics.
+
+Travels inside every exported FMU (relative imports only) and drives any class of the unit protocol: PARAMETERS,
+INPUTS, outputs(), initialize(), step(), output(), state. Answers to the host (see `failure`):
+  - a step that does not converge, meets a number that is not finite, or is asked for out of order: logged, discard,
+    the unit stands where it stood before;
+  - a refused parameter or initialisation, and a bug: fmi2Fatal with the message, the process lives on.
+Statics and everything else that initialisation costs is done when the first output is asked for, or at the end of
+initialisation mode.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from pythonfmu import Fmi2Slave
+from pythonfmu.default_experiment import DefaultExperiment
+from pythonfmu.enums import Fmi2Status
+
+from . import schema
+from .description import fill
+from .failure import Refused, guarded, printable, release_at_exit, where
+from .ports import Ports, Run
+
+CONFIGURATION = "configuration"
+START = "start."  # before the name of a parameter that has the name of a port, whose start value it is
+BROKEN_ARITHMETIC = (ArithmeticError, ValueError, np.linalg.LinAlgError)  # a failed step, not a bug
+TIME_TOLERANCE = 1e-6  # of a step: hosts add up their time in ways of their own
+
+Reader = Callable[[], list[Any]]
+
+
+class Snapshot(NamedTuple):
+    """Everything a rollback needs; the unit's state is an immutable value, so this is a handful of references."""
+
+    phase: str
+    time: float
+    inputs: bytes
+    changed: dict[str, Any]
+    unit: Any
+
+
+class UnitSlave(Fmi2Slave):
+    """Base class of the slave in an FMU's entry script; `unit_class` is the unit it carries."""
+
+    unit_class: ClassVar[Any]
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        about = json.loads(Path(self.resources, "fmu.json").read_text(encoding="utf-8"))
+        release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{about['about']['modelName']}.so")
+        self.description = self.unit_class.DESCRIPTION
+        for name, value in about["about"].items():  # modelName, guid, author, license, version, description
+            setattr(self, name, value)
+        self.default_experiment = DefaultExperiment(**about["experiment"]) if about["experiment"] else None
+        self.parameters = schema.build(self.unit_class.PARAMETERS, about["parameters"])
+        inputs, outputs = self.unit_class.INPUTS, self.unit_class.outputs(self.parameters)
+        fields, taken = schema.flatten(self.parameters), {*inputs, *outputs}
+        self._fields = {(START if name.partition("[")[0] in taken else "") + name: name for name in fields}
+        flat = {name: fields[own] for name, own in self._fields.items()}
+        flat[CONFIGURATION] = schema.Parameter("String", "", doc="All parameters as JSON; empty: the built-in ones")
+        self.ports = Ports(inputs, outputs, flat)
+        self.inputs = np.zeros(self.ports.n_inputs)
+        self._run_of_inputs = list(range(self.ports.n_inputs))
+        self.changed: dict[str, Any] = {}  # parameters set by the host; replaced, never mutated
+        self.phase, self.time = "instantiated", 0.0
+        self.unit: Any = None
+        self._readers: dict[tuple[int, ...], list[Reader]] = {}
+
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
+        """PythonFMU's frame, completed."""
+        root = super().to_xml(model_options or {})
+        fill(root, self.ports.variables())
+        return root
+
+    # life cycle
+
+    @guarded
+    def setup_experiment(self, start_time: float, stop_time: float | None = None, tolerance: float | None = None) -> None:
+        if not math.isfinite(start_time):
+            raise Refused(f"start time = {start_time}: must be finite")
+        self.time = start_time
+
+    @guarded
+    def enter_initialization_mode(self) -> None:
+        self.phase = "initializing"
+
+    @guarded
+    def exit_initialization_mode(self) -> None:
+        self._ready()
+        self.phase = "stepping"
+
+    @guarded
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        message = self._step(current_time, step_size)
+        if message is not None:
+            self.log(printable(message), Fmi2Status.discard)
+        return message is None
+
+    def _step(self, time: float, step: float) -> str | None:
+        if self.phase != "stepping":
+            return f"step at {time:.9g} s: the FMU is not initialised"
+        if not (math.isfinite(step) and step > 0.0):
+            return f"step = {step}: must be > 0 s"
+        if not abs(time - self.time) <= TIME_TOLERANCE * step:
+            return f"time = {time!r}: the FMU stands at {self.time!r} s"
+        held = self._held()
+        before = self.unit.state
+        try:
+            message = self._not_finite() or self.unit.step(time, step, held)
+        except BROKEN_ARITHMETIC as error:
+            message = where(error)
+        if message is None:
+            self.time = time + step
+        else:
+            self.unit.state = before
+        return message
+
+    # variables
+
+    @guarded
+    def get_real(self, vrs: list[int]) -> list[Any]:
+        key = tuple(vrs)
+        readers = self._readers.get(key)
+        if readers is None:  # hosts repeat themselves: the runs of a request are found once
+            readers = self._readers[key] = [self._reader(run) for run in self.ports.runs(key)]
+        return readers[0]() if len(readers) == 1 else [value for read in readers for value in read()]
+
+    get_integer = get_boolean = get_string = get_real
+
+    @guarded
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        first, last = (vrs[0], vrs[-1]) if vrs else (0, -1)
+        if vrs == self._run_of_inputs[first : last + 1]:  # the usual case
+            self.inputs[first : last + 1] = values
+        else:
+            for vr, value in zip(vrs, values, strict=True):
+                self._set(vr, value)
+        if self.phase == "initializing":
+            self.unit = None
+
+    set_integer = set_boolean = set_string = set_real
+
+    def _set(self, vr: int, value: Any) -> None:
+        causality, name, _ = self.ports.place(vr)
+        if causality == "input":
+            self.inputs[vr] = value
+        elif causality == "output":
+            raise Refused(f"{name} = {value}: an output cannot be set")
+        elif self.phase == "stepping":
+            raise Refused(f"{name} = {value}: a parameter cannot be set after initialisation")
+        elif isinstance(value, float) and not math.isfinite(value):
+            raise Refused(f"{name} = {value}: must be finite")
+        else:
+            self.changed = {**self.changed, name: value}
+
+    def _reader(self, run: Run) -> Reader:
+        name, part = run.name, run.part
+        if run.causality == "parameter":
+            return lambda: [self.changed.get(name, self.ports.parameters[name].value)]
+        if run.causality == "input":
+            return lambda: self.inputs[self.ports.input_slices[name]][part].tolist()
+
+        def read() -> list[float]:
+            unit = self.unit
+            return (self._ready() if unit is None else unit).output(name)[part].tolist()
+
+        return read
+
+    # state
+
+    @guarded
+    def _get_fmu_state(self) -> Snapshot:
+        unit = None if self.unit is None else self.unit.state
+        return Snapshot(self.phase, self.time, self.inputs.tobytes(), self.changed, unit)
+
+    @guarded
+    def _set_fmu_state(self, state: Snapshot | Refused) -> None:
+        if isinstance(state, Refused):
+            raise state
+        if state.unit is None or (state.changed is not self.changed and state.changed != self.changed):
+            self.unit = None
+        self.phase, self.time, self.changed = state.phase, state.time, state.changed
+        self.inputs[:] = np.frombuffer(state.inputs)
+        if state.unit is not None:
+            if self.unit is None:
+                self.unit = self._make_unit()
+            self.unit.state = state.unit
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: Snapshot) -> bytes:
+        try:
+            return pickle.dumps(tuple(state), protocol=5)
+        except Exception as error:  # no instance to protect here: the message travels in the bytes
+            return pickle.dumps(f"state: cannot be serialised: {error}")
+
+    @staticmethod
+    def _fmu_state_from_bytes(data: bytes) -> Snapshot | Refused:
+        try:
+            content = pickle.loads(data)
+        except Exception as error:  # damaged bytes raise anything
+            return Refused(f"state: cannot be read back: {error}")
+        return Refused(content) if isinstance(content, str) else Snapshot(*content)
+
+    # inside
+
+    def _ready(self) -> Any:
+        """The initialised unit; made when first asked for, anew when something was set since."""
+        if self.unit is None:
+            if self.phase == "instantiated":
+                raise Refused("outputs: not defined before initialisation")
+            unit, held = self._make_unit(), self._held()
+            message = self._not_finite() or unit.initialize(self.time, held)
+            if message is not None:
+                raise Refused(message)
+            self.unit = unit
+        return self.unit
+
+    def _make_unit(self) -> Any:
+        changes = dict(self.changed)
+        text = changes.pop(CONFIGURATION, "")
+        tree = schema.from_json(self.unit_class.PARAMETERS, text) if text else self.parameters
+        tree = schema.override(tree, {self._fields[name]: value for name, value in changes.items()})
+        given = self.unit_class.outputs(tree)
+        for name, port in self.ports.outputs.items():
+            if name not in given or given[name][0] != port[0]:
+                raise Refused(f"{CONFIGURATION}: changes the output {name}; such an FMU must be exported anew")
+        return self.unit_class(tree)
+
+    def _held(self) -> dict[str, np.ndarray]:
+        """A copy of the inputs by name, which the unit may keep."""
+        values = self.inputs.copy()
+        return {name: values[part] for name, part in self.ports.input_slices.items()}
+
+    def _not_finite(self) -> str | None:
+        if np.isfinite(self.inputs).all():
+            return None
+        bad = next(i for i, value in enumerate(self.inputs) if not math.isfinite(value))
+        _, name, i = self.ports.place(bad)
+        return f"{name}[{i + 1}] = {self.inputs[bad]}: must be finite"

@@ -1,0 +1,169 @@
+"""Packs a unit package into an FMU: adapter and schema join it under a name with a content hash.
+
+An FMU carries its unit as a package of its own (``pipe_fmu_<hash>``, see `entry`), so building in a process that later
+runs FMUs mixes nothing up; still, a build imports the unit, so a program that wants its FMU runs free of it builds in
+a child process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import importlib
+import importlib.metadata
+import json
+import os
+import shutil
+import sys
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from xml.etree import ElementTree
+
+from pythonfmu import FmuBuilder
+
+from .document import icon_png, port_table_html
+
+HERE = Path(__file__).parent
+BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py")
+CAPABILITIES = {"needsExecutionTool": False, "canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date a zip archive can hold: equal contents, equal bytes
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What goes into an FMU.
+
+    `package` is the folder of the unit package, `unit` the place of its class in it (``slave.PipeUnit``), `parameters`
+    the nested mapping that becomes the defaults. Without a `description` the unit's own is taken. `experiment` may hold
+    start_time, stop_time, step_size, tolerance.
+    """
+
+    package: Path
+    unit: str
+    parameters: Mapping[str, Any]
+    description: str = ""
+    author: str = "the pipelay authors"
+    license: str = "MIT"
+    experiment: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """FMI model name: the class without its ending, ``Pipe``."""
+        return self.unit.rpartition(".")[2].removesuffix("Unit")
+
+    @functools.cached_property
+    def bundle(self) -> str:
+        """Name of the package inside the FMU, with the hash of all its sources."""
+        return f"{self.package.name}_{_digest(_sources(self))}"
+
+    @property
+    def digest(self) -> str:
+        """Hash of everything the FMU's content follows from."""
+        facts = {**_about(self), "parameters": self.parameters, "experiment": dict(self.experiment)}
+        return _digest({"bundle": self.bundle, "facts": json.dumps(facts, sort_keys=True)})
+
+
+def build_fmu(recipe: Recipe, destination: Path) -> Path:
+    """Write the FMU to the file `destination`, whole or not at all.
+
+    Raises ValueError if the unit refuses its parameters or declares a unit of measure that is not understood.
+    """
+    destination.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="fmu_") as folder, _clean_imports():
+        entry, configuration = Path(folder, f"{recipe.bundle}_entry.py"), Path(folder, "fmu.json")
+        shutil.copy(HERE / "entry.py", entry)
+        about = {**_about(recipe), "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, recipe.digest))}
+        content = {"about": about, "parameters": recipe.parameters, "experiment": dict(recipe.experiment)}
+        configuration.write_text(json.dumps(content, indent=1), encoding="utf-8")
+        bundle = Path(folder, recipe.bundle)
+        for name, text in _sources(recipe).items():
+            target = bundle / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(text)
+        raw = FmuBuilder.build_FMU(entry, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **CAPABILITIES)
+        finished = destination.with_name(f".{os.getpid()}_{destination.name}")
+        _finish(Path(raw), finished)
+        finished.replace(destination)
+    return destination
+
+
+def cached_fmu(recipe: Recipe, folder: Path) -> Path:
+    """The FMU of this recipe in `folder`, built if it is not there: ``folder/Pipe_<hash>.fmu``."""
+    path = folder / f"{recipe.name}_{recipe.digest}.fmu"
+    return path if path.is_file() else build_fmu(recipe, path)
+
+
+def bundled_package(fmu: Path) -> ModuleType:
+    """The unit package inside an FMU file, imported from where the FMU itself imports it.
+
+    For a process that needs the unit's own interface: compiled kernels are then shared with the FMU.
+    """
+    with tempfile.TemporaryDirectory(prefix="fmu_") as folder, zipfile.ZipFile(fmu) as archive, _clean_imports():
+        archive.extractall(folder, [name for name in archive.namelist() if name.startswith("resources/")])
+        resources = Path(folder, "resources")
+        sys.path.insert(0, str(resources))
+        entry = importlib.import_module((resources / "slavemodule.txt").read_text())
+        return sys.modules[entry.PACKAGE]
+
+
+def _about(recipe: Recipe) -> dict[str, str]:
+    try:
+        version = importlib.metadata.version("pipelay")
+    except importlib.metadata.PackageNotFoundError:
+        version = "0"
+    about = {"modelName": recipe.name, "author": recipe.author, "license": recipe.license, "version": version}
+    return about | ({"description": recipe.description} if recipe.description else {})
+
+
+def _sources(recipe: Recipe) -> dict[str, bytes]:
+    """Files of the bundle by relative name: the unit package, the adapter, and the module that joins the two."""
+    files = {
+        path.relative_to(recipe.package).as_posix(): path.read_bytes()
+        for path in sorted(recipe.package.rglob("*"))
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    module, _, name = recipe.unit.rpartition(".")
+    files["fmi_unit.py"] = f"from .fmi.adapter import UnitSlave\nfrom .{module} import {name} as Unit\n".encode()
+    files["fmi/__init__.py"] = b""
+    files.update({f"fmi/{source}": (HERE / source).read_bytes() for source in BUNDLED})
+    return files
+
+
+def _digest(parts: Mapping[str, str | bytes]) -> str:
+    digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
+    digest.update((HERE / "entry.py").read_bytes())
+    for name, content in sorted(parts.items()):
+        data = content.encode() if isinstance(content, str) else content
+        digest.update(f"{name}\0{len(data)}\0".encode() + data)
+    return digest.hexdigest()[:12]
+
+
+def _finish(raw: Path, finished: Path) -> None:
+    """Repack compressed, in fixed order and with fixed dates; add documentation and icon."""
+    with zipfile.ZipFile(raw) as source, zipfile.ZipFile(finished, "w", zipfile.ZIP_DEFLATED) as target:
+        contents = {name: source.read(name) for name in source.namelist()}
+        model = ElementTree.fromstring(contents["modelDescription.xml"])
+        contents["documentation/index.html"] = port_table_html(model).encode()
+        contents["model.png"] = icon_png()
+        for name in sorted(contents):
+            target.writestr(zipfile.ZipInfo(name, _EPOCH), contents[name], zipfile.ZIP_DEFLATED)
+
+
+@contextlib.contextmanager
+def _clean_imports():  # type: ignore[no-untyped-def]
+    """Undo what the builder does to sys.path, and forget the modules it imported from the temporary folder."""
+    path, modules = list(sys.path), set(sys.modules)
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        for name in set(sys.modules) - modules:
+            if name.endswith("_entry"):
+                del sys.modules[name]

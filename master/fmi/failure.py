@@ -1,0 +1,87 @@
+"""How a failure inside an FMU reaches the host, and the process survives it, and its own end.
+
+PythonFMU knows three answers: OK, fmi2Discard (``do_step`` returns False) and, for a Python exception, fmi2Fatal. For
+every exception it also releases the class, the instance and the log list once too often, so that the second one kills
+the process. `Refused` is therefore raised through `refusal`, which takes those references beforehand; PythonFMU logs
+its repr. FMI messages are printf formats, so '%' is doubled.
+
+At the end of a process PythonFMU's library gives back its interpreter handle twice if it is still loaded then, and the
+process aborts. numba's libraries bind to it and keep it loaded, whatever the host closes; `release_at_exit` gives the
+handle back in time.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import ctypes
+import functools
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+LONGEST = 1000  # characters; hosts format messages in buffers of fixed size
+
+
+class Refused(Exception):  # noqa: N818  (no error of the program: a message to the host)
+    """Carries one line to the host."""
+
+    def __repr__(self) -> str:
+        return printable(str(self))
+
+
+def printable(message: str) -> str:
+    """One line, fit for a printf format."""
+    return " ".join(message.split())[:LONGEST].replace("%", "%%")
+
+
+def where(error: BaseException) -> str:
+    """Type, text, file and line of an exception that nobody expected."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    place = f" ({Path(trace.tb_frame.f_code.co_filename).name}, line {trace.tb_lineno})" if trace else ""
+    return f"{type(error).__name__}: {error}{place}"
+
+
+def refusal(slave: Any, message: str) -> Refused:
+    """The exception to raise out of a method of `slave` that PythonFMU calls."""
+    for released in (type(slave), slave, slave.log_queue):
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(released))
+    return Refused(message)
+
+
+def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator for the methods that PythonFMU calls: nothing leaves them but a harmless `Refused`."""
+
+    @functools.wraps(method)
+    def call(slave: Any, *arguments: Any) -> Any:
+        try:
+            return method(slave, *arguments)
+        except (Refused, ValueError) as error:
+            raise refusal(slave, str(error)) from None
+        except KeyboardInterrupt:
+            raise refusal(slave, "interrupted") from None
+        except Exception as error:  # a bug: say where it is, and let the host stop
+            raise refusal(slave, where(error)) from None
+
+    return call
+
+
+def release_at_exit(library: Path) -> None:
+    """Have the PythonFMU `library` let go of the interpreter before a Python host exits (Linux)."""
+    if hasattr(os, "RTLD_NOLOAD") and str(library) not in _released:
+        _released.add(str(library))
+        atexit.register(_release, library)
+
+
+_released: set[str] = set()
+
+
+def _release(library: Path) -> None:
+    if threading.get_native_id() != os.getpid():  # PythonFMU itself runs the interpreter, in a thread of its own
+        return
+    with contextlib.suppress(OSError, AttributeError):  # it was unloaded after all
+        ctypes.CDLL(str(library), os.RTLD_NOLOAD | os.RTLD_NOW).finalizePythonInterpreter()

@@ -1,0 +1,188 @@
+"""The energy ledger: what the FMUs report of themselves, summed over the whole and checked after every step.
+
+Each FMU reports energies E and, cumulative since the start, works W done on it from outside, dissipations D, and the
+work B done on it through the bond; its own identity is dE = dW + dB - dD. Summed over all FMUs the bond cancels, so
+
+    closure = sum of (E - E_start) - (W - W_start) + (D - D_start)
+
+is zero but for the interface residual, the sum of dB, and round-off. The check relies on nothing the master computed: a
+flipped sign or a wrong axis of a port leaves every FMU's own identity intact, and shows here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .coupling import Step
+from .errors import RunError
+
+ROUND_OFF = 1e-12  # of the largest energy, work or dissipation: what differences of large sums may lose
+REFINEMENTS = 8  # times one step may be sent back before the check fails
+
+Action = Literal["stop", "refine", "warn"]
+
+
+class EnergyCheckFailed(RunError):  # noqa: N818
+    """The ledger does not close; the text is one line with time, numbers and the likely culprit."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Names of an FMU's energy outputs [J]; those that it does not have are left out. `bond` None: nothing coupled."""
+
+    energy: Sequence[str] = ()
+    work: Sequence[str] = ()
+    dissipation: Sequence[str] = ()
+    bond: str | None = None
+
+
+class Source(Protocol):
+    """What an account is kept of: an FMU, or anything that reads like one."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def ports(self) -> Mapping[str, Any]: ...
+
+    def get(self, names: tuple[str, ...]) -> NDArray[Any]: ...
+
+
+class _Account:
+    """One FMU's columns, and the signs with which they enter its balance."""
+
+    def __init__(self, fmu: Source, columns: Columns) -> None:
+        groups = [(columns.energy, 1.0), (columns.work, -1.0), (columns.dissipation, 1.0)]
+        kept = [(name, sign) for names, sign in groups for name in names if name in fmu.ports]
+        if columns.bond is not None:
+            kept.append((columns.bond, 0.0))
+        self.fmu, self.names = fmu, tuple(name for name, _ in kept)
+        self.signs = np.array([sign for _, sign in kept])
+        self.has_bond = columns.bond is not None
+        self.start = self.last = self.now = fmu.get(self.names)
+
+    def read(self) -> None:
+        self.now = self.fmu.get(self.names)
+
+    @property
+    def closure(self) -> float:
+        """Energy + dissipation - work from outside, since the start; for an FMU on a bond this is the bond's work."""
+        return float(self.signs @ (self.now - self.start))
+
+    @property
+    def bond(self) -> float:
+        """Work through the bond in this step."""
+        return float(self.now[-1] - self.last[-1]) if self.has_bond else 0.0
+
+    @property
+    def balance(self) -> float:
+        """The FMU's own identity over this step: zero to its solver's tolerance."""
+        return float(self.signs @ (self.now - self.last)) - self.bond
+
+    @property
+    def moved(self) -> float:
+        """Energy that went through the bond in this step; without a bond the largest change of any column."""
+        return abs(self.bond) if self.has_bond else float(np.abs(self.now - self.last).max(initial=0.0))
+
+
+class Ledger:
+    """Opens with the FMUs initialised and at rest between two steps; call `check` after every step.
+
+    `tolerance` is the closure error allowed, relative to the energy exchanged so far: the sum of |dB| of the first FMU
+    (of a single FMU without a bond: of the largest change of any column); to it comes ROUND_OFF of the largest column.
+    `action` on a violation: "stop" raises EnergyCheckFailed, "refine" sends the step back to be halved and stops when
+    that does not help, "warn" keeps the first complaint and goes on.
+    """
+
+    def __init__(self, sources: Sequence[tuple[Source, Columns]], tolerance: float = 1e-8, action: Action = "stop") -> None:
+        self.tolerance, self.action = tolerance, action
+        self._accounts = [_Account(fmu, columns) for fmu, columns in sources]
+        self._refused = 0
+        self.exchanged = 0.0  # running totals [J]; the interface residual adds up absolute values
+        self.interface_residual = self.closure = self.largest_closure = 0.0
+        self.step_residual = 0.0
+        self.largest = self._largest()  # magnitude so far of any column
+        self.allowed = ROUND_OFF * self.largest
+        self.complaint = ""  # the first violation, in one line
+
+    @property
+    def names(self) -> list[str]:
+        """Names of `row`: every column with its FMU, then the totals [J]."""
+        columns = [f"{account.fmu.name}.{name}" for account in self._accounts for name in account.names]
+        return [*columns, "interface_residual", "closure", "exchanged", "allowed"]
+
+    @property
+    def row(self) -> list[float]:
+        """The columns after the last step, the residual of that step, running closure, exchanged energy and what is allowed [J]."""
+        columns = np.concatenate([account.last for account in self._accounts]).tolist()
+        return [*columns, self.step_residual, self.closure, self.exchanged, self.allowed]
+
+    def check(self, step: Step) -> bool:
+        """Read all FMUs and judge the step; False sends it back. Raises EnergyCheckFailed."""
+        return self.record(step.time + step.step)
+
+    def record(self, time: float) -> bool:
+        """As `check`, for a step that ended at `time`."""
+        accounts = self._accounts
+        for account in accounts:
+            account.read()
+        exchanged = self.exchanged + accounts[0].moved
+        closure = sum(account.closure for account in accounts)
+        residual = sum(account.bond for account in accounts) if len(accounts) > 1 else 0.0
+        largest = max(self.largest, self._largest())
+        allowed = self.tolerance * exchanged + ROUND_OFF * largest
+        # the residual of the bond is inside the closure; judged by itself too, so that no other error can hide it
+        passed = abs(closure) <= allowed and abs(residual) <= allowed
+        if not passed and self._sent_back(time, closure, residual, exchanged, allowed):
+            return False
+        for account in accounts:
+            account.last = account.now
+        self.exchanged, self.closure, self.step_residual, self._refused = exchanged, closure, residual, 0
+        self.largest, self.allowed = largest, allowed
+        self.interface_residual += abs(residual)
+        self.largest_closure = max(self.largest_closure, abs(closure))
+        return True
+
+    def summary(self) -> dict[str, float]:
+        """The figures of the run [J]."""
+        return {
+            "exchanged_energy_J": self.exchanged,
+            "interface_residual_J": self.interface_residual,
+            "ledger_closure_J": self.largest_closure,
+            "energy_check_allowed_J": self.allowed,
+        }
+
+    def verdict(self) -> str:
+        """The outcome in words."""
+        figures = (
+            f"largest closure error {self.largest_closure:.2g} J, at the end {self.allowed:.2g} J allowed ({self.tolerance:.0e} of the "
+            f"{self.exchanged:.3g} J exchanged and {ROUND_OFF:.0e} of the largest column, {self.largest:.3g} J); "
+            f"the bond made {self.interface_residual:.2g} J"
+        )
+        if self.complaint:
+            return f"energy check failed: {figures}; first {self.complaint.removeprefix('energy check ')}"
+        return f"energy check passed: {figures}"
+
+    def _largest(self) -> float:
+        """Magnitude of the largest column as last read."""
+        return max((float(np.abs(account.now).max(initial=0.0)) for account in self._accounts), default=0.0)
+
+    def _sent_back(self, time: float, closure: float, residual: float, exchanged: float, allowed: float) -> bool:
+        """Deal with a violation; True if the step is to be repeated."""
+        own = [f"{account.fmu.name}'s own balance is off by {account.balance:.2g} J" for account in self._accounts]
+        text = (
+            f"energy check failed at {time:.9g} s: closure error {closure:.3g} J of {exchanged:.3g} J exchanged "
+            f"(allowed {allowed:.3g} J); in this step the bond made {residual:.3g} J, {', '.join(own)}"
+        )
+        self._refused += 1
+        if self.action == "refine" and self._refused <= REFINEMENTS:
+            return True
+        self.complaint = self.complaint or text
+        if self.action != "warn":
+            raise EnergyCheckFailed(text)
+        return False

@@ -1,0 +1,77 @@
+"""The process that prepares a run: checks the scene's units, finds the equilibrium, writes the FMUs.
+
+Reads the scene as JSON from standard input; `--export DIR` writes pipe.fmu and vessel.fmu there, else they go to a cache by content. Prints
+one JSON object: fmus, parameters, equilibrium; or error and exit.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pipe_fmu
+import vessel_fmu
+from master import statics
+from master.errors import RunError, UsageError
+from master.fmi.build import Recipe, build_fmu, cached_fmu
+from master.fmi.schema import to_mapping
+from master.scene import from_mapping
+
+
+def prepare(mapping: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """FMU files, parameters to set and the equilibrium of a scene. Raises UsageError, RunError."""
+    scene = from_mapping(mapping, "scene")
+    rest = statics.equilibrium(scene)
+    at = statics.released(scene, rest)
+    simulation = scene.sections.simulation
+    experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
+    recipes = {"pipe": Recipe(Path(pipe_fmu.__file__).parent, "slave.PipeUnit", to_mapping(at.pipe), experiment=experiment)}
+    if at.vessel is not None:
+        package = Path(vessel_fmu.__file__).parent
+        recipes["vessel"] = Recipe(package, "slave.VesselUnit", to_mapping(at.vessel), experiment=experiment)
+    fmus = {
+        name: cached_fmu(recipe, _cache()) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
+        for name, recipe in recipes.items()
+    }
+    equilibrium: dict[str, Any] = {"top_force_e_N": rest.found.top[:3].tolist(), "top_moment_e_N_m": rest.found.top[3:].tolist()}
+    if at.vessel is not None:
+        equilibrium |= {"hold_force": at.vessel.hold_force, "vessel": asdict(at.vessel.start)}
+    return {
+        "fmus": {name: str(path) for name, path in fmus.items()},
+        "parameters": {name: {} for name in fmus},
+        "equilibrium": equilibrium,
+    }
+
+
+def _cache() -> Path:
+    chosen = os.environ.get("PIPELAY_CACHE")
+    for place in (Path(chosen) if chosen else Path.home() / ".cache" / "pipelay", Path(tempfile.gettempdir()) / "pipelay"):
+        try:
+            (place / "fmus").mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        return place / "fmus"
+    raise RunError("no folder can be written for the FMUs; set PIPELAY_CACHE to one that can")
+
+
+def main(arguments: list[str]) -> None:
+    """Entry point."""
+    folder = Path(arguments[1]) if arguments[:1] == ["--export"] else None
+    try:
+        answer = prepare(json.load(sys.stdin), folder)
+    except (UsageError, RunError) as error:
+        answer = {"error": str(error), "exit": 2 if isinstance(error, UsageError) else 1}
+    try:
+        json.dump(answer, sys.stdout)
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever asked went away
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

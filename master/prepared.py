@@ -1,0 +1,54 @@
+"""The run's side of `master.prepare`: that process validates a scene, solves its equilibrium and exports its FMUs.
+
+It is a process of its own because it works with the units' own packages, while a process that runs FMUs knows them by
+file and port names only.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from master.errors import RunError, UsageError
+from master.scene import Scene
+
+COMMAND = (sys.executable, "-m", "master.prepare")
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene ready to run: the FMU files by unit name, the parameters to set in each, and the equilibrium found."""
+
+    fmus: dict[str, Path]
+    parameters: dict[str, dict[str, Any]]
+    equilibrium: dict[str, Any]
+
+
+def prepare(scene: Scene, arguments: Sequence[str] = ()) -> Prepared:
+    """Have the scene prepared by the child process, called with `arguments`.
+
+    Raises UsageError for what the units refuse in the scene, RunError without an equilibrium or a child breaking off.
+    """
+    request = json.dumps(scene.mapping, default=str)
+    # a session of its own: Ctrl-C is for this process, which then ends the child
+    child = subprocess.Popen([*COMMAND, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    with child:
+        try:
+            output, _ = child.communicate(request)
+        except BaseException:
+            child.kill()
+            child.wait()
+            raise
+    try:
+        answer = json.loads(output)
+    except ValueError:
+        raise RunError(f"preparing the scene broke off with exit code {child.returncode}") from None
+    if "error" in answer:
+        raise (UsageError if answer.get("exit") == 2 else RunError)(answer["error"])
+    fmus = {name: Path(path) for name, path in answer["fmus"].items()}
+    return Prepared(fmus, answer["parameters"], answer["equilibrium"])

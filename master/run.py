@@ -1,0 +1,153 @@
+"""A run from the scene to the files: prepare, load the FMUs, step to the end, write what was recorded.
+
+Whatever ends a run early, a failed step, a broken energy balance or Ctrl-C, the results up to there are written.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import threading
+import time as clock
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from tqdm import tqdm
+
+from master import figures, report
+from master.drive import Drive, open_drive
+from master.errors import RunError, UsageError
+from master.interrupts import postponed
+from master.ledger import EnergyCheckFailed
+from master.prepared import prepare
+from master.recorder import Recorder
+from master.scene import Scene
+
+OWN_FILES = ("signals.csv", "shapes.npz", "summary.json", "energy.png", "fig[3-9]_*.png")
+SLOW = 8.0  # s without a sign of life before a word about compiling
+
+
+@dataclass(frozen=True)
+class Result:
+    """The end of a run: whether it reached its end with the energy check kept, its summary, the screen table."""
+
+    passed: bool
+    summary: dict[str, Any]
+    screen: str
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How the stepping ended: completed, stopped by the energy check, failed or interrupted."""
+
+    status: str
+    message: str = ""
+
+
+def simulate(scene: Scene, folder: Path, stream: TextIO) -> Result:
+    """Run a scene and leave its results in `folder`; progress goes to `stream`, to a terminal only.
+
+    Raises UsageError where the scene or the folder cannot be used, RunError where the run could not even start.
+    """
+    with _scratch_folder(folder) as scratch:
+        with ExitStack() as stack:
+            begun = clock.perf_counter()
+            patience = _patience(stream)
+            stack.callback(patience.cancel)
+            prepared = prepare(scene)
+            drive = stack.enter_context(open_drive(scene.sections, prepared))
+            simulation = scene.sections.simulation
+            length = float(drive.units["pipe"].get("s")[-1])
+            recorder = Recorder(drive.units, simulation.recording_step, simulation.snapshots)
+            started = clock.perf_counter()
+            ending = _march(drive, recorder, scene, stream, patience)
+            wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
+            if ending.status in ("completed", "interrupted"):  # else the FMUs may stand in the middle of a step
+                recorder.record_shape(drive.time)
+            account = {"unstretched_length_m": length, **asdict(ending), **asdict(drive.effort), **wall, **drive.ledger.summary()}
+            account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}
+            account |= {"energy_check": ending.message if ending.status == "stopped" else drive.ledger.verdict()}
+        result = _write(scene, recorder, account, scratch)
+        _move_into_place(scratch, folder)
+    return result
+
+
+def _march(drive: Drive, recorder: Recorder, scene: Scene, stream: TextIO, patience: threading.Timer) -> Ending:
+    """Step to the end, recording after every step; the first one may compile and ends the need for `patience`."""
+    end = scene.sections.simulation.duration
+    recorder.sample(drive.time, _row(drive))
+    with postponed() as interrupted, _progress(end, stream) as bar:
+        while drive.time < end:
+            before = drive.time
+            try:
+                drive.advance(end)
+            except EnergyCheckFailed as error:
+                return Ending("stopped", str(error))
+            except RunError as error:
+                return Ending("failed", str(error))
+            patience.cancel()
+            recorder.sample(drive.time, _row(drive))
+            bar.update(drive.time - before)
+            if interrupted.is_set():
+                return Ending("interrupted", f"interrupted at {drive.time:g} s of {end:g} s")
+    return Ending("completed")
+
+
+def _row(drive: Drive) -> dict[tuple[str, str], float]:
+    """What is recorded beside the ports: the derived values and the ledger."""
+    return drive.derived() | {(name, "J"): value for name, value in zip(drive.ledger.names, drive.ledger.row, strict=True)}
+
+
+def _write(scene: Scene, recorder: Recorder, account: dict[str, Any], folder: Path) -> Result:
+    """Write every file of the results into `folder`."""
+    signals, shapes = recorder.table(), recorder.shapes()
+    summary = report.summarise({"scene": scene.name, **account}, signals)
+    signals.write(folder / "signals.csv")
+    if shapes is not None:
+        shapes.write(folder / "shapes.npz")
+    instants = [t for t in scene.sections.simulation.snapshots if t <= signals.column("time")[-1]]
+    figures.draw_all(folder, signals, shapes, instants)
+    report.write_summary(folder / "summary.json", summary)
+    passed = summary["status"] == "completed" and summary["energy_check_passed"]
+    return Result(passed, summary, report.screen(summary, scene.sections.title))
+
+
+def _move_into_place(scratch: Path, folder: Path) -> None:
+    """Replace the results of an earlier run in `folder` by those in `scratch`; other files there stay."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for pattern in OWN_FILES:
+        for old in folder.glob(pattern):
+            old.unlink()
+    for new in sorted(scratch.iterdir()):
+        shutil.move(new, folder / new.name)
+
+
+@contextmanager
+def _scratch_folder(folder: Path) -> Iterator[Path]:
+    """A folder in `folder`, or beside it, for files in the making. Raises UsageError where none can be made."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        scratch = tempfile.TemporaryDirectory(prefix=".pipelay-", dir=folder if folder.is_dir() else folder.parent)
+    except OSError as error:
+        raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
+    with scratch as name:
+        yield Path(name)
+
+
+def _progress(end: float, stream: TextIO) -> Any:
+    """A bar over simulated time; nothing where `stream` is no terminal."""
+    style = "{percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} s simulated, {remaining} left"
+    return tqdm(total=end, file=stream, disable=not stream.isatty(), bar_format=style, leave=False)
+
+
+def _patience(stream: TextIO) -> threading.Timer:
+    """A timer that says why it takes long, if it does and somebody sits at the terminal; to be cancelled."""
+    words = "a first run compiles the numerical kernels, which takes a minute or two; later runs find them again"
+    timer = threading.Timer(SLOW, tqdm.write, [words, stream])
+    timer.daemon = True
+    if stream.isatty():
+        timer.start()
+    return timer

@@ -1,0 +1,170 @@
+"""Scenes: TOML files that name what is simulated, built-in ones among the package's data.
+
+A scene is read, changed by `--set key=value`, and checked as far as the master's own sections go; the tables of the
+units stay plain mappings, which the process that prepares a run hands to the units' own dataclasses.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from master.errors import UsageError
+from master.fmi.schema import build
+from master.sections import Coupling, Simulation, Start, Tables, TopMotion
+
+BUILT_IN = resources.files("master") / "scenes"
+UNIT_TABLES = ("environment", "pipe", "vessel")
+FOUND = {
+    "pipe.top_position": "follows from [start]",
+    "pipe.top_quaternion": "follows from [start]",
+    "pipe.nodes_at": "follows from nodes, tolerance and mesh",
+    "pipe.environment": "is the table [environment]",
+    "vessel.environment": "is the table [environment]",
+    "vessel.start": "follows from [start]",
+    "vessel.hold_force": "is found by the statics",
+    "vessel.departure_angle": "is found by the statics, or start.departure",
+    "vessel.departure_rotation": "is found by the statics",
+}
+"""Parameters of the units that a scene may not give, and where they come from."""
+
+
+class SceneError(UsageError):
+    """A scene that cannot be used; one line that names key, value and rule."""
+
+
+@dataclass(frozen=True)
+class Sections:
+    """The tables of a scene; those of the units are checked by the units."""
+
+    simulation: Simulation
+    start: Start
+    environment: dict
+    pipe: dict
+    title: str = ""
+    description: str = ""
+    coupling: Coupling = field(default_factory=Coupling)
+    vessel: dict | None = None
+    top_motion: TopMotion | None = None
+    tables: Tables | None = None
+
+    def __post_init__(self) -> None:
+        if self.vessel is None and self.top_motion is None:
+            raise ValueError("vessel = nothing: must be given, or [top_motion] for a pipe alone")
+        if self.vessel is None:
+            self._check_pipe_alone()
+        elif self.top_motion is not None:
+            raise ValueError("top_motion: must be absent where [vessel] moves the top")
+        elif self.start.z is not None:
+            raise ValueError(
+                f"start.z = {self.start.z:g}: must be absent with [vessel], which floats at its own height"
+            )
+
+    def _check_pipe_alone(self) -> None:
+        if self.start.z is None:
+            raise ValueError("start.z = nothing: must be given for a pipe alone")
+        for name in ("tables", "start.release"):
+            owner, _, key = name.rpartition(".")
+            if getattr(getattr(self, owner) if owner else self, key) is not None:
+                raise ValueError(f"{name}: must be absent without [vessel], on which it acts")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene by name, its checked sections, and the plain mapping that it came from."""
+
+    name: str
+    sections: Sections
+    mapping: dict[str, Any]
+
+
+def built_in() -> dict[str, str]:
+    """Names of the built-in scenes and their titles."""
+    files = sorted((f for f in BUILT_IN.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
+    return {f.name.removesuffix(".toml"): str(_parse(f.name, f.read_bytes()).get("title", "")) for f in files}
+
+
+def load(name: str, changes: Iterable[str] = ()) -> Scene:
+    """The scene of a built-in name or of a TOML file, with `changes` ("key=value") made to it.
+
+    Raises SceneError.
+    """
+    path = Path(name)
+    mapping = _parse(name, _read(name, path))
+    for change in changes:
+        _merge(mapping, _parse_change(change), change)
+    return from_mapping(mapping, path.stem)
+
+
+def from_mapping(mapping: dict[str, Any], name: str) -> Scene:
+    """The scene of a nested mapping as TOML gives it. Raises SceneError."""
+    for key in UNIT_TABLES:
+        if not isinstance(mapping.get(key, {}), dict):
+            raise SceneError(f"{key} = {mapping[key]!r}: must be a table")
+    for key, origin in FOUND.items():
+        table, _, leaf = key.partition(".")
+        if leaf in mapping.get(table, {}):
+            raise SceneError(f"{key}: {origin}; must be absent")
+    try:
+        return Scene(name, build(Sections, mapping), mapping)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+
+
+def _read(name: str, path: Path) -> bytes:
+    if path.name == name and not path.suffix:
+        if (found := BUILT_IN / f"{name}.toml").is_file():
+            return found.read_bytes()
+        names = list(built_in())
+        near = difflib.get_close_matches(name, names, 1, 0.5)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        raise SceneError(
+            f"scene = {name!r}: unknown built-in scene{hint}; there are {', '.join(names)}, or give a .toml file"
+        )
+    if path.suffix != ".toml":
+        raise SceneError(f"scene = {name!r}: a scene file must end in .toml")
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise SceneError(f"scene = {name!r}: no such file") from None
+    except OSError as error:
+        raise SceneError(f"scene = {name!r}: cannot be read ({error.strerror})") from None
+
+
+def _parse(name: str, content: bytes) -> dict[str, Any]:
+    try:
+        return tomllib.loads(content.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise SceneError(f"scene = {name!r}: must be UTF-8 text ({error.reason} at byte {error.start})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"scene = {name!r}: not TOML: {error}") from None
+
+
+def _parse_change(change: str) -> dict[str, Any]:
+    key, equals, value = (part.strip() for part in change.partition("="))
+    if not (key and equals and value):
+        raise SceneError(f"--set {change}: must be key=value, as in simulation.duration=60")
+    try:
+        return tomllib.loads(f"{key} = {value}")
+    except tomllib.TOMLDecodeError:
+        rule = (
+            'the value must be a number, true, false, [a, list] or a "text" in quotes (quote the whole for the shell)'
+        )
+        raise SceneError(f"--set {change}: {rule}") from None
+
+
+def _merge(mapping: dict[str, Any], change: Mapping[str, Any], source: str, path: str = "") -> None:
+    """Put the leaves of `change` into `mapping`, in place."""
+    for key, value in change.items():
+        where = f"{path}.{key}" if path else key
+        if not isinstance(value, dict) or not value or key not in mapping:
+            mapping[key] = value
+        elif isinstance(mapping[key], dict):
+            _merge(mapping[key], value, source, where)
+        else:
+            raise SceneError(f"--set {source}: {where} = {mapping[key]!r} is no table that could hold a key")

@@ -1,0 +1,146 @@
+"""The scene's sections that the master itself reads; [pipe], [vessel] and [environment] belong to the units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+
+RULES: dict[str, tuple[str, Callable[[float, float], bool]]] = {
+    "above": (">", lambda value, bound: value > bound),
+    "min": (">=", lambda value, bound: value >= bound),
+    "below": ("<", lambda value, bound: value < bound),
+    "max": ("<=", lambda value, bound: value <= bound),
+}
+
+
+def _number(doc: str, unit: str, **bounds: Any) -> Any:
+    """Dataclass field of one number or several in `unit`; `bounds`: min, max, above, below, and its `default`."""
+    default = {"default": bounds.pop("default")} if "default" in bounds else {}
+    return field(**default, metadata={"doc": doc, "unit": unit, **bounds})
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table of numbers that checks its ranges when made; ValueError reads "key = value: rule"."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            for number in value if isinstance(value, tuple) else (value,):
+                for key, (sign, holds) in RULES.items():
+                    if key in item.metadata and number is not None and not holds(number, item.metadata[key]):
+                        unit = item.metadata["unit"]
+                        bound = f"{item.metadata[key]:g}" + (f" {unit}" if unit != "1" else "")
+                        raise ValueError(f"{item.name} = {number:g}: must be {sign} {bound}")
+
+
+@dataclass(frozen=True)
+class Simulation(Section):
+    """[simulation]: how long, in what steps, and what is kept."""
+
+    duration: float = _number("time simulated", "s", above=0.0)
+    macro_step: float = _number("step of the coupling, the largest where it adapts", "s", above=0.0)
+    recording_step: float | None = _number("time between recorded shapes, once a step at most; absent: none", "s", above=0.0, default=None)
+    snapshots: tuple[float, ...] = _number(
+        "instants drawn in figure 3 beside start and end; those after the end are ignored", "s", min=0.0, default=()
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.macro_step > self.duration:
+            raise ValueError(f"macro_step = {self.macro_step:g}: must be <= duration = {self.duration:g} s")
+
+
+@dataclass(frozen=True)
+class Coupling(Section):
+    """[coupling]: the macro step and the energy check."""
+
+    scheme: Literal["energy-consistent", "serial", "parallel"] = "energy-consistent"
+    tolerance: float = _number("energy the bond may make in a step, relative", "1", above=0.0, below=1.0, default=1e-9)
+    energy_check: float = _number("limit of residual and closure over the energy exchanged", "1", above=0.0, default=1e-8)
+    on_violation: Literal["stop", "refine", "warn"] = "stop"
+
+
+@dataclass(frozen=True)
+class Release(Section):
+    """[start.release]: the vessel starts displaced from its equilibrium, at rest."""
+
+    heave: float = _number("down from the equilibrium", "m", default=0.0)
+    roll: float = _number("starboard down", "rad", min=-0.5, max=0.5, default=0.0)
+    pitch: float = _number("bow up", "rad", min=-0.5, max=0.5, default=0.0)
+
+
+@dataclass(frozen=True)
+class Start(Section):
+    """[start]: where the vessel's hang-off point, or the top of a pipe alone, is held in the equilibrium."""
+
+    x: float = _number("forward of the foot", "m")
+    y: float = _number("starboard of the foot", "m", default=0.0)
+    z: float | None = _number("top of a pipe alone, down (negative); a vessel floats at its own", "m", below=0.0, default=None)
+    yaw: float = _number("heading", "rad", min=-math.pi, max=math.pi, default=0.0)
+    departure: float | None = _number(
+        "pitch of the held pipe over the bow direction; absent: the pipe's own",
+        "rad",
+        min=-math.pi,
+        max=math.pi,
+        default=None,
+    )
+    release: Release | None = None
+
+
+@dataclass(frozen=True)
+class TopMotion(Section):
+    """[top_motion]: harmonic displacement of the top of a pipe alone, faded in by a half cosine."""
+
+    amplitude: tuple[float, float, float] = _number("amplitude in x, y, z", "m")
+    period: float = _number("period", "s", above=0.0)
+    ramp: float = _number("time of the fade-in", "s", min=0.0, default=0.0)
+
+    def displacement(self, time: float) -> np.ndarray:
+        """Displacement (3,) [m] from the start at `time` [s]."""
+        fade = 0.5 * (1.0 - math.cos(math.pi * time / self.ramp)) if time < self.ramp else 1.0
+        return np.array(self.amplitude) * (fade * math.sin(2.0 * math.pi * time / self.period))
+
+    def mean_velocity(self, time: float, step: float) -> np.ndarray:
+        """Mean velocity (3,) [m/s] over a step: the exact change of position over its length, which cannot drift."""
+        return (self.displacement(time + step) - self.displacement(time)) / step
+
+
+@dataclass(frozen=True)
+class Load(Section):
+    """A row of [[tables.environment]]: spatial force and moment on the vessel at its centre of gravity."""
+
+    time: float = _number("instant", "s")
+    force: tuple[float, float, float] = _number("force", "N", default=(0.0, 0.0, 0.0))
+    moment: tuple[float, float, float] = _number("moment", "N.m", default=(0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Tables:
+    """[tables]: loads over time, linear between their rows, constant before the first and after the last."""
+
+    environment: tuple[Load, ...]
+
+    def __post_init__(self) -> None:
+        if not self.environment:
+            raise ValueError("environment = []: must have at least one row")
+        times = [row.time for row in self.environment]
+        for i, (before, after) in enumerate(pairwise(times), 2):
+            if not after > before:
+                raise ValueError(f"environment[{i}].time = {after:g}: must be > {before:g} s, the row before")
+
+
+def mean_load(rows: Sequence[Load], time: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Mean force (3,) [N] and moment (3,) [N.m] of a table over [time, time + step], exact for the broken line."""
+    knots = np.array([row.time for row in rows])
+    inside = knots[(knots > time) & (knots < time + step)]
+    instants = np.concatenate([[time], inside, [time + step]])
+    values = np.array([[*row.force, *row.moment] for row in rows])
+    at = np.column_stack([np.interp(instants, knots, column) for column in values.T])
+    mean = np.sum(0.5 * (at[1:] + at[:-1]) * np.diff(instants)[:, None], axis=0) / step
+    return mean[:3], mean[3:]

@@ -1,0 +1,235 @@
+"""Coupled static equilibrium of a scene: where the vessel floats and how the pipe hangs before the first step.
+
+The hang-off point is held in x, y and the vessel's heading; heave, roll and pitch settle under restoring, weight of the pipe and current.
+The thrust that holds x, y and heading follows (the paper's G_stat = 0 has no such equilibrium without it). Works with the units' own
+packages, so never in a process that runs FMUs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import root
+from scipy.spatial.transform import Rotation
+
+from master.errors import RunError, UsageError
+from master.fmi.schema import build
+from master.scene import Scene
+from pipe_fmu import Pipe, PipeParameters, resolve
+from pipe_fmu.environment import Environment
+from pipe_fmu.statics import Equilibrium
+from vessel_fmu.parameters import Start, VesselParameters
+from vessel_fmu.vessel import Vessel
+
+T = TypeVar("T")
+_UNBALANCE = 1e-9  # of the pipe's pull (times a metre for moments) left to the vessel
+_NOISE = 1e-12  # of a vector's norm: components below it are round-off
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Parameters of the units at equilibrium (released from it where the scene says so), and the pipe's equilibrium."""
+
+    pipe: PipeParameters
+    vessel: VesselParameters | None
+    found: Equilibrium
+
+
+def equilibrium(scene: Scene) -> Prepared:
+    """Equilibrium of a scene, without its release. Raises UsageError for parameters the units refuse, RunError where none is found."""
+    start = scene.sections.start
+    environment = scene.mapping["environment"]
+    depth = _checked(Environment, environment, "environment").depth
+    pipe = _resolved(_pipe(scene, (start.x, start.y, -depth if start.z is None else start.z)))
+    if scene.sections.vessel is None:
+        attitude = None if start.departure is None else Rotation.from_euler("zy", [start.yaw, start.departure])
+        found = _hang(Pipe(pipe), np.array(pipe.top_position), attitude)
+        return Prepared(_placed(pipe, found), None, found)
+    vessel = _checked(VesselParameters, scene.mapping["vessel"] | {"environment": environment}, "vessel")
+    return _floating(scene, pipe, vessel)
+
+
+def released(scene: Scene, at: Prepared) -> Prepared:
+    """`at`, with the vessel moved by the scene's release and the pipe hanging statically from where that brings its top."""
+    release = scene.sections.start.release
+    if release is None or at.vessel is None:
+        return at
+    start = at.vessel.start
+    x, y, z = start.position
+    roll, pitch, yaw = start.attitude
+    moved = replace(start, position=(x, y, z + release.heave), attitude=(roll + release.roll, pitch + release.pitch, yaw))
+    vessel = replace(at.vessel, start=moved)
+    state = Vessel(vessel).start()
+    body = Vessel(vessel)
+    point, held = body.hang_off_pose(body.position(state), state.quaternion)
+    found = _hang(Pipe(at.pipe), point, _rotation(held))
+    return Prepared(_posed(at.pipe, point, held), vessel, found)
+
+
+def report(scene: Scene) -> dict[str, Any]:
+    """What `pipelay statics --json` prints; forces and moments act on the pipe, in e.
+
+    The touchdown is the arc length at which the centreline, linear between the nodes, last rises through z = -d/8 of the pipe's diameter d
+    over its coating; 0 where no node lies lower. The lowest point is that of the nodes. Round-off against the norm of its vector is 0.
+    """
+    at = equilibrium(scene)
+    pipe, found = Pipe(at.pipe), at.found
+    state = pipe.at_rest(found)
+    forces = pipe.section_forces(state)
+    touchdown = None
+    if at.pipe.seabed is not None:
+        touchdown = _touchdown(pipe.s, found.position[:, 2] + 0.125 * pipe.line.diameter[0])
+    top, foot = _without_noise(found.top), _without_noise(found.foot)
+    return {
+        "top_force_e_N": top[:3].tolist(),
+        "top_moment_e_N_m": top[3:].tolist(),
+        "foot_force_e_N": foot[:3].tolist(),
+        "foot_moment_e_N_m": foot[3:].tolist(),
+        "top_tension_N": float(forces.tension[-1]),
+        "stretch_m": pipe.stretched_length(state) - at.pipe.length,
+        "largest_bending_moment_N_m": float(pipe.largest_bending_moment(forces)),
+        "lowest_point_m": float(found.position[:, 2].max()),
+        "touchdown_s_m": touchdown,
+        "stable": bool(found.stable),
+        "vessel_position_m": None if at.vessel is None else _without_noise(at.vessel.start.position).tolist(),
+        "hold_force_N": None if at.vessel is None else list(at.vessel.hold_force),
+        "s_m": pipe.s.tolist(),
+        "position_e_m": _without_noise(found.position).tolist(),
+        "tension_N": forces.tension.tolist(),
+        "bending_moment_N_m": np.hypot(forces.moment[:, 1], forces.moment[:, 2]).tolist(),
+        "shear_N": np.hypot(forces.shear[:, 0], forces.shear[:, 1]).tolist(),
+    }
+
+
+def _floating(scene: Scene, pipe_parameters: PipeParameters, parameters: VesselParameters) -> Prepared:
+    """Heave, roll and pitch at which the vessel carries the pipe; then the thrust that holds the rest."""
+    start, pipe = scene.sections.start, Pipe(pipe_parameters)
+    depth = parameters.environment.depth
+    pull = float(np.linalg.norm(_hang(pipe, np.array(pipe_parameters.top_position), None).top[:3]))
+
+    def settle(unknown: np.ndarray) -> tuple[VesselParameters, Equilibrium, np.ndarray, np.ndarray, np.ndarray]:
+        z, roll, pitch = unknown
+        attitude = Rotation.from_euler("ZYX", [start.yaw, pitch, roll])
+        centre = np.array([start.x, start.y, z - depth]) - attitude.apply(parameters.hang_off) * [1.0, 1.0, 0.0]
+        posed = replace(parameters, start=Start(position=_three(centre), attitude=(roll, pitch, start.yaw)), hold_force=(0.0, 0.0, 0.0))
+        if start.departure is not None:
+            posed = replace(posed, departure_angle=start.departure)
+        body = Vessel(posed)
+        state = body.start()
+        point, held = body.hang_off_pose(body.position(state), state.quaternion)
+        found = _hang(pipe, point, _rotation(held) if start.departure is not None else None)
+        force, moment = body.static_load(body.position(state), state.quaternion, body.surface_current(0.0))
+        centred = body.moment_about_centre(state.quaternion, -found.top[:3], -found.top[3:])
+        return posed, found, force - found.top[:3], moment + centred, point
+
+    def unbalance(unknown: np.ndarray) -> np.ndarray:
+        _, _, force, moment, _ = settle(unknown)
+        return np.array([force[2], *(Rotation.from_euler("z", -start.yaw).apply(moment)[:2])]) / pull
+
+    solution = root(unbalance, np.zeros(3), method="hybr", options={"xtol": 1e-14})
+    if not np.abs(unbalance(solution.x)).max() < _UNBALANCE:
+        raise RunError(
+            f"statics: the vessel finds no equilibrium in heave, roll and pitch (unbalance {np.abs(solution.fun).max():.1e} of the pull)"
+        )
+    posed, found, force, moment, point = settle(solution.x)
+    if start.departure is None:
+        state = Vessel(posed).start()
+        relative = _rotation(state.quaternion).inv() * _rotation(found.quaternion[-1])
+        first = relative.apply([1.0, 0.0, 0.0])
+        angle = float(np.arctan2(-first[2], first[0]))
+        rest = relative * Rotation.from_euler("y", -angle)
+        posed = replace(posed, departure_angle=angle, departure_rotation=_three(rest.as_rotvec()))
+    hold = _without_noise((-force[0], -force[1], -moment[2]))
+    posed = _checked_replace(posed, {"hold_force": _three(hold)})
+    body = Vessel(posed)
+    _, held = body.hang_off_pose(np.array(posed.start.position), body.start().quaternion)
+    return Prepared(_posed(pipe_parameters, point, held), posed, found)
+
+
+def _hang(pipe: Pipe, point: np.ndarray, attitude: Rotation | None) -> Equilibrium:
+    """The pipe's equilibrium with its top at `point`. Raises RunError if there is none."""
+    held = None if attitude is None else np.roll(attitude.as_quat(), 1)
+    found = pipe.equilibrium(_three(point), held, 0.0)
+    if not found.converged:
+        raise RunError(
+            f"statics: the pipe finds no equilibrium with its top at {tuple(np.round(point, 3).tolist())} m: "
+            f"residual {found.residual:.1e} of its weight after {found.iterations} corrections"
+        )
+    return found
+
+
+def _pipe(scene: Scene, top: tuple[float, float, float]) -> PipeParameters:
+    """The scene's pipe hanging from `top` [m]; each of its `sections` has what it does not say itself from `section`."""
+    mapping, (x, y, z) = scene.mapping["pipe"], top
+    common, sections = mapping.get("section", {}), mapping.get("sections")
+    if isinstance(common, dict) and isinstance(sections, list):
+        mapping = mapping | {"sections": [common | entry if isinstance(entry, dict) else entry for entry in sections]}
+    above = {"top_position": [0.0, 0.0, z], "top_quaternion": [0.0] * 4, "environment": scene.mapping["environment"]}
+    pipe = _checked(PipeParameters, mapping | above, "pipe")  # over the foot first: a pipe that is too short even there is named
+    if pipe.length <= (distance := math.hypot(*top)):
+        name, value = ("start.x", x) if abs(x) >= abs(y) else ("start.y", y)
+        rule = f"must keep the distance from foot to top, {distance:.6g} m, below pipe.length = {pipe.length:g} m"
+        raise UsageError(f"{name} = {value:g}: {rule}")
+    return replace(pipe, top_position=top)
+
+
+def _checked(kind: type[T], mapping: dict[str, Any], path: str) -> T:
+    try:
+        return build(kind, mapping, path)
+    except ValueError as error:
+        raise UsageError(str(error).replace(f"{path}.environment.", "environment.")) from None
+
+
+def _checked_replace(vessel: VesselParameters, changes: dict[str, Any]) -> VesselParameters:
+    try:
+        return replace(vessel, **changes)
+    except ValueError as error:
+        raise UsageError(f"vessel.{error}") from None
+
+
+def _resolved(parameters: PipeParameters) -> PipeParameters:
+    try:
+        return resolve(parameters)
+    except ValueError as error:
+        raise UsageError(f"pipe.{error}") from None
+
+
+def _placed(pipe: PipeParameters, found: Equilibrium) -> PipeParameters:
+    return _posed(pipe, found.position[-1], found.quaternion[-1])
+
+
+def _posed(pipe: PipeParameters, point: np.ndarray, quaternion: np.ndarray) -> PipeParameters:
+    w, x, y, z = (float(q) for q in quaternion)
+    try:
+        return replace(pipe, top_position=_three(point), top_quaternion=(w, x, y, z))
+    except ValueError as error:
+        raise UsageError(f"pipe.{error}") from None
+
+
+def _rotation(quaternion: np.ndarray) -> Rotation:
+    return Rotation.from_quat(np.roll(np.asarray(quaternion), -1))
+
+
+def _touchdown(s: np.ndarray, depth: np.ndarray) -> float:
+    """Arc length where `depth` (n,), linear over `s` (n,), last falls through 0; 0 where it is never above."""
+    lying = np.flatnonzero(depth > 0.0)
+    last = int(lying[-1]) if lying.size else 0
+    if not lying.size or last == len(s) - 1:
+        return float(s[last])
+    return float(s[last] + (s[last + 1] - s[last]) * depth[last] / (depth[last] - depth[last + 1]))
+
+
+def _without_noise(vector: ArrayLike) -> np.ndarray:
+    """`vector` with what is round-off against its norm set to 0."""
+    values = np.array(vector, dtype=float)
+    values[np.abs(values) <= _NOISE * np.linalg.norm(values)] = 0.0
+    return values
+
+
+def _three(vector: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in vector)
+    return x, y, z

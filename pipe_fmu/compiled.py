@@ -1,0 +1,29 @@
+"""Compilation of the kernels: plain arrays in, plain arrays out, cached on disk.
+
+numba looks at a kernel's own file to see whether its cached code is still good, but not at the files of the kernels it
+calls. So when any source of the package is newer than a cache index, all indices of the package are dropped and
+everything is compiled afresh.
+"""
+
+import os
+from pathlib import Path
+
+from numba import njit
+
+
+def drop_stale_cache(package: Path) -> int:
+    """Remove numba's cache indices of the package folder if one is older than a source; return how many were removed."""
+    indices = list(package.glob("__pycache__/*.nbi"))
+    if not os.access(package, os.W_OK):
+        return 0  # numba keeps its cache elsewhere
+    newest = max(source.stat().st_mtime for source in package.glob("*.py"))
+    if all(index.stat().st_mtime >= newest for index in indices):
+        return 0
+    for index in indices:
+        index.unlink(missing_ok=True)
+    return len(indices)
+
+
+drop_stale_cache(Path(__file__).parent)
+
+kernel = njit(cache=True, error_model="numpy")

@@ -1,0 +1,40 @@
+"""Quadratic drag on a slender section, eqs. (29)-(31), for a section symmetric about t1 (D_2 = D_3)."""
+
+import math
+
+from .compiled import kernel
+from .so3 import add, dot, scale
+
+
+@kernel
+def drag(v_r, tangent, tangential, normal):
+    """Drag force per length on the water [N/m] for relative velocity `v_r` and unit tangent t1, all in e.
+
+    `tangential`, `normal` are rho d D_1 / 2 and rho d D_2 / 2 [N s^2/m^3]. The pipe feels minus this force; force . v_r >= 0.
+    Also returns the coefficients (a, b, c) of the derivative  d force / d v_r = a I + b t t^T + c v_n v_n^T,  and v_n.
+    """
+    v_t = dot(v_r, tangent)
+    v_n = add(v_r, scale(-v_t, tangent))
+    speed = math.sqrt(dot(v_n, v_n))
+    force = add(scale(normal * speed, v_n), scale(tangential * math.fabs(v_t) * v_t, tangent))
+    a = normal * speed
+    return force, a, 2.0 * tangential * math.fabs(v_t) - a, (normal / speed if speed > 0.0 else 0.0), v_n
+
+
+@kernel
+def current_at(z, levels, velocities):
+    """Current (3,) at depth coordinate z: linear between `levels` (n,), ascending, constant beyond; `velocities` (n, 3) [m/s]."""
+    n = levels.shape[0]
+    if z <= levels[0]:
+        return (velocities[0, 0], velocities[0, 1], velocities[0, 2])
+    if z >= levels[n - 1]:
+        return (velocities[n - 1, 0], velocities[n - 1, 1], velocities[n - 1, 2])
+    k = 1
+    while levels[k] < z:
+        k += 1
+    f = (z - levels[k - 1]) / (levels[k] - levels[k - 1])
+    return (
+        velocities[k - 1, 0] + f * (velocities[k, 0] - velocities[k - 1, 0]),
+        velocities[k - 1, 1] + f * (velocities[k, 1] - velocities[k - 1, 1]),
+        velocities[k - 1, 2] + f * (velocities[k, 2] - velocities[k - 1, 2]),
+    )

@@ -1,0 +1,175 @@
+"""From parameters to the discretised line."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from . import catenary, mesh, recovery, statics
+from .element import ROWS
+from .line import Array, Line, Water, shear_stiffness
+from .parameters import PipeParameters, Section
+from .step_kernel import element_strains
+
+_PROBE = 4  # elements of the probing mesh for one of the mesh to be made,
+_PROBE_LIMIT = 2000  # as long as there are fewer than these
+_TRIES = (12, 16, 24, 32, 47, 64, 96, 128, 192, 256, 384, 512, 768, 1024)  # elements tried for a tolerance
+
+
+def resolve(parameters: PipeParameters) -> PipeParameters:
+    """The parameters with their nodes placed (`nodes_at`): as the mesh's kind says, or as few as the tolerance allows.
+
+    Raises ValueError where the sections need more nodes, or where no mesh keeps the tolerance.
+    """
+    if parameters.nodes_at:
+        return parameters
+    count = parameters.nodes - 1
+    if parameters.tolerance is None:
+        return _placed(parameters, _mesh(parameters, count))
+    for count in _TRIES:
+        if count < len(parameters.all_sections):
+            continue
+        trial = _placed(parameters, _mesh(parameters, count))
+        found = _characteristics(trial)
+        finer = _characteristics(_placed(parameters, _mesh(parameters, 2 * count)))
+        if found is not None and finer is not None and np.abs(found / finer - 1.0).max() <= parameters.tolerance:
+            return trial
+    raise ValueError(f"tolerance = {parameters.tolerance:g}: must be within reach of {_TRIES[-1]} elements")
+
+
+def discretize(parameters: PipeParameters) -> tuple[Array, Line]:
+    """Arc lengths S (n,) [m] of the nodes, and the line. Raises ValueError as `resolve` does."""
+    s = np.array(resolve(parameters).nodes_at)
+    return s, _line(parameters, s)
+
+
+def _mesh(parameters: PipeParameters, count: int) -> Array:
+    """Nodes of `count` elements, of the kind the parameters name."""
+    if parameters.mesh == "uniform":
+        return mesh.even(parameters, count)
+    estimate = estimate_tension(parameters)
+    probe = mesh.graded(parameters, estimate, max(count, min(_PROBE * count, _PROBE_LIMIT)))
+    forces = _at_rest(parameters, probe)
+    if forces is None:
+        return mesh.graded(parameters, estimate, count)
+    tension = np.maximum(forces[:, 0], max(1e-3 * float(forces[:, 0].max()), 1e-9))
+    stiffest = max(section.stiffness[3] for section in parameters.all_sections)
+    return mesh.adapted(parameters, probe, forces[:, 4:], np.sqrt(stiffest / tension), count)
+
+
+def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
+    """Nodal section forces (n, 6), material components, of the equilibrium on nodes `s` (n,), if there is one."""
+    line, calm = _line(parameters, s), water(parameters, 0.0)
+    attitude = np.array(parameters.top_quaternion)
+    found = statics.solve(line, s, calm, parameters.top_position, attitude if attitude.any() else None)
+    if not found.converged:
+        return None
+    strain = np.empty((len(s) - 1, ROWS))
+    element_strains(line, found.position, found.quaternion, strain)
+    zero = np.zeros_like(found.position)
+    return recovery.nodal_wrenches(line, calm, found.position, found.quaternion, zero, strain)
+
+
+def _characteristics(parameters: PipeParameters) -> Array | None:
+    """What a tolerance is measured by: tension at both ends, largest bending moment, and the end moments beside it."""
+    s = np.array(parameters.nodes_at)
+    solved = _at_rest(parameters, s)
+    if solved is None:
+        return None
+    forces = recovery.SectionForces.of(solved)
+    largest = recovery.largest_bending_moment(s, forces)
+    ends = [largest + float(np.hypot(*forces.moment[at, 1:])) for at in (0, -1)]
+    return np.array([forces.tension[0], forces.tension[-1], largest, *ends])
+
+
+def _placed(parameters: PipeParameters, s: Array) -> PipeParameters:
+    return replace(parameters, nodes=len(s), nodes_at=tuple(float(x) for x in s), tolerance=None)
+
+
+def _line(parameters: PipeParameters, s: Array) -> Line:
+    """Element and node data on the nodes `s` (n,)."""
+    h = np.diff(s)
+    gravity, density = parameters.environment.gravity, parameters.environment.water_density
+    section = _picker(parameters, s)
+    stiffness = section(lambda one: one.stiffness)
+    k2, p2 = shear_stiffness(stiffness[:, 1], stiffness[:, 4], h)
+    k3, p3 = shear_stiffness(stiffness[:, 1], stiffness[:, 3], h)
+    mass = section(lambda one: one.mass_per_length)
+    displaced = section(lambda one: density * one.outer_area)
+    diameter = section(lambda one: one.hydrodynamic_diameter)
+    added = np.zeros((0, 3))
+    if parameters.added_mass is not None:
+        across = parameters.added_mass.coefficient * displaced
+        added = _lump(np.column_stack([0.0 * across, across, across]), h)
+    bed = np.zeros(0)
+    if parameters.seabed is not None:
+        bed = np.array([parameters.seabed.damping, parameters.seabed.friction, parameters.seabed.friction_speed])
+    line = Line(
+        length=h,
+        stiffness=np.column_stack([stiffness[:, 0], k2, k3, stiffness[:, 2:]]),
+        share=np.column_stack([p2, p3]),
+        weight=(mass - displaced) * gravity,
+        drag=0.5 * density * diameter[:, None] * section(lambda one: (one.drag_tangential, one.drag_normal)),
+        diameter=diameter,
+        mass=_lump(mass[:, None], h)[:, 0],
+        offset=np.diff(h, prepend=0.0, append=0.0) / 6.0,
+        inertia=_lump(section(lambda one: one.inertia), h),
+        spin_damping=_lump(section(lambda one: one.rotational_damping), h),
+        added_mass=added,
+        damping=np.full(len(h) if parameters.internal_damping > 0.0 else 0, parameters.internal_damping),
+        bed=bed,
+        foot_clamped=parameters.foot == "clamped",
+        top_clamped=parameters.top == "clamped",
+        numerical_damping=float(parameters.numerical_damping),
+    )
+    return line
+
+
+def water(parameters: PipeParameters, time: float) -> Water:
+    """The water at `time` [s]."""
+    environment = parameters.environment
+    sticks = any(section.drag_normal > 0.0 or section.drag_tangential > 0.0 for section in parameters.all_sections)
+    current = environment.current
+    factor = current.time_factor(time) if current is not None else 0.0
+    if current is None or factor == 0.0:
+        return Water(np.zeros(0), np.zeros((0, 3)), sticks)
+    depths, factors = current.shape(environment.depth)
+    levels = np.array(depths) - environment.depth  # from the surface down, so ascending in z
+    return Water(levels, factor * np.outer(factors, current.velocity), sticks)
+
+
+def estimate_tension(parameters: PipeParameters) -> tuple[float, float]:
+    """Tension [N] at foot and top of the catenary of the same weight."""
+    x, y, z = parameters.top_position
+    weight = _mean_weight(parameters)
+    c, _ = catenary.parameter(parameters.length, float(np.hypot(x, y)), max(-z, 1e-6), parameters.seabed is not None)
+    return abs(weight) * c, abs(weight) * (c + max(-z, 0.0))
+
+
+def _mean_weight(parameters: PipeParameters) -> float:
+    environment = parameters.environment
+    total = 0.0
+    for section in parameters.all_sections:
+        per_length = (section.mass_per_length - environment.water_density * section.outer_area) * environment.gravity
+        total += per_length * (section.length or parameters.length)
+    return total / parameters.length
+
+
+def _picker(parameters: PipeParameters, s: Array) -> Callable[[Callable[[Section], object]], Array]:
+    """Function that lists a property of the section of every element."""
+    ends = np.cumsum([section.length or parameters.length for section in parameters.all_sections])
+    which = np.searchsorted(ends, 0.5 * (s[1:] + s[:-1]))
+
+    def pick(property_of: Callable[[Section], object]) -> Array:
+        table = np.array([property_of(section) for section in parameters.all_sections], dtype=float)
+        return table[which]
+
+    return pick
+
+
+def _lump(per_length: Array, h: Array) -> Array:
+    """Nodal sums (n, k) of a quantity per length (n - 1, k), half of every element to each end."""
+    out = np.zeros((len(h) + 1, per_length.shape[1]))
+    out[:-1] += 0.5 * h[:, None] * per_length
+    out[1:] += 0.5 * h[:, None] * per_length
+    return out

@@ -1,0 +1,191 @@
+"""Newton's method for one step, and the pipe as its top feels it."""
+
+import math
+
+import numpy as np
+
+from .block_tridiagonal import SIZE, condense, factorize, lu, lu_solve, substitute
+from .compiled import kernel
+from .so3 import dot, matrix
+from .step_kernel import step_system
+
+TOLERANCE = 1e-11  # of the largest element force (moment): well below any coupling tolerance
+ROUND_OFF = 1e-9  # accepted once the residual no longer falls
+NEAR = 1e-5  # residual from which on a tangent is kept
+SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
+LOST = 1e12  # residual from which there is no way back
+
+
+@kernel
+def _axis(quaternion):
+    """Direction t1 of the foot."""
+    rm = matrix((quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3]))
+    return (rm[0][0], rm[1][0], rm[2][0])
+
+
+@kernel
+def hold_foot(line, quaternion, diagonal, upper):
+    """Impose the foot on the tangent: clamped, or pinned (position held, no spin about t1, so that the line's twist is determined)."""
+    block, coupling = diagonal[0], upper[0]
+    for i in range(SIZE if line.foot_clamped else 3):
+        for j in range(SIZE):
+            block[i, j] = 1.0 if i == j else 0.0
+            coupling[i, j] = 0.0
+    if line.foot_clamped:
+        return
+    axis = _axis(quaternion)
+    stiffness = line.stiffness[0, 3] / line.length[0]
+    for j in range(SIZE):
+        along = block[3, j] * axis[0] + block[4, j] * axis[1] + block[5, j] * axis[2]
+        across = coupling[3, j] * axis[0] + coupling[4, j] * axis[1] + coupling[5, j] * axis[2]
+        for i in range(3):
+            block[3 + i, j] -= axis[i] * along
+            coupling[3 + i, j] -= axis[i] * across
+            if j >= 3:
+                block[3 + i, j] += stiffness * axis[i] * axis[j - 3]
+
+
+@kernel
+def hold_foot_residual(line, quaternion, theta, residual):
+    """Impose the foot on the residual; `theta` its trial rotation."""
+    for i in range(SIZE if line.foot_clamped else 3):
+        residual[0, i] = 0.0
+    if line.foot_clamped:
+        return
+    axis = _axis(quaternion)
+    stiffness = line.stiffness[0, 3] / line.length[0]
+    along = dot((residual[0, 3], residual[0, 4], residual[0, 5]), axis)
+    turned = dot(theta, axis)
+    for i in range(3):
+        residual[0, 3 + i] += axis[i] * (stiffness * turned - along)
+
+
+@kernel
+def _free_rotation(block, sides):
+    """Solve the rotation rows of the top's block (6, 6) for `sides` (3, m), in place; False if singular."""
+    a = np.empty((3, 3))
+    pivots = np.empty(3, np.int64)
+    for i in range(3):
+        for j in range(3):
+            a[i, j] = block[3 + i, 3 + j]
+    if not lu(a, pivots):
+        return False
+    lu_solve(a, pivots, sides)
+    return True
+
+
+@kernel
+def top_correction(line, block, right, wanted, move):
+    """Correction of the top node into `move` (6,): `wanted` where prescribed, solved for where free. False if singular."""
+    for i in range(SIZE):
+        move[i] = wanted[i]
+    if line.top_clamped:
+        return True
+    sides = np.empty((3, 1))
+    for i in range(3):
+        sides[i, 0] = -right[3 + i]
+        for j in range(3):
+            sides[i, 0] -= block[3 + i, j] * wanted[j]
+    fine = _free_rotation(block, sides)
+    for i in range(3):
+        move[3 + i] = sides[i, 0]
+    return fine
+
+
+@kernel
+def condense_top(line, block, out):
+    """Tangent d(force, moment) / d(displacement, rotation) at the top into `out` (6, 6); a pinned top has no moment."""
+    for i in range(SIZE):
+        for j in range(SIZE):
+            out[i, j] = block[i, j]
+    if line.top_clamped:
+        return
+    sides = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            sides[i, j] = block[3 + i, j]
+    _free_rotation(block, sides)
+    for i in range(SIZE):
+        for j in range(SIZE):
+            if i >= 3 or j >= 3:
+                out[i, j] = 0.0
+            else:
+                for k in range(3):
+                    out[i, j] -= block[i, 3 + k] * sides[k, j]
+
+
+@kernel
+def _size(residual, force_scale, moment_scale, top_clamped):
+    """Largest free residual over its scale."""
+    worst = 0.0
+    n = residual.shape[0]
+    for i in range(n):
+        for j in range(SIZE):
+            if i == n - 1 and (top_clamped or j < 3):
+                continue
+            ratio = math.fabs(residual[i, j]) / (force_scale if j < 3 else moment_scale)
+            if not ratio <= worst:
+                worst = ratio
+    return worst
+
+
+@kernel
+def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, limit):
+    """Increments (n, 6) of one step with the top's increment `top` (6,) prescribed, from `guess` (n, 6), in at most `limit` corrections.
+
+    The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
+    is made anew for every further one. Returns (converged, x, new_strain, top force (6,) on the pipe, condensed tangent (6, 6), works (6,),
+    corrections, residual).
+    """
+    n = guess.shape[0]
+    system = (np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6)))
+    diagonal, lower, upper, residual = system
+    pivots = np.empty((n - 1, SIZE), np.int64)
+    x = guess.copy()
+    correction = np.empty((n, SIZE))
+    new_strain = np.empty(strain.shape)
+    works = np.empty(6)
+    tangent = np.zeros((6, 6))
+    force, wanted, move = np.empty(6), np.empty(6), np.empty(6)
+    previous, size = math.inf, math.inf
+    fresh, keep = True, True
+    for iteration in range(limit + 1):
+        force_scale, moment_scale = step_system(
+            line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, system, works
+        )
+        gap = 0.0
+        for i in range(SIZE):
+            force[i] = residual[n - 1, i]
+            wanted[i] = top[i] - x[n - 1, i]
+            if line.top_clamped or i < 3:
+                gap = max(gap, math.fabs(wanted[i]))
+        hold_foot_residual(line, quaternion, (x[0, 3], x[0, 4], x[0, 5]), residual)
+        size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
+        done = gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous))
+        if done and iteration > 0:
+            return True, x, new_strain, force, tangent, works, iteration, size
+        if not size < LOST or iteration == limit:
+            break
+        if fresh:
+            hold_foot(line, quaternion, diagonal, upper)
+            if not factorize(diagonal, lower, upper, pivots):
+                break
+            condense_top(line, diagonal[n - 1], tangent)
+        elif size > SLOW * previous or size > NEAR:
+            fresh, keep = True, size <= SLOW * previous
+            continue
+        if done:
+            return True, x, new_strain, force, tangent, works, iteration, size
+        fresh = not keep
+        condense(diagonal, lower, pivots, residual)
+        if not top_correction(line, diagonal[n - 1], residual[n - 1], wanted, move):
+            break
+        substitute(upper, residual, move, correction)
+        for k in range(n):
+            for i in range(SIZE):
+                x[k, i] += correction[k, i]
+        for i in range(SIZE):
+            if line.top_clamped or i < 3:
+                x[n - 1, i] = top[i]
+        previous = size
+    return False, x, new_strain, force, tangent, works, limit, size

@@ -1,0 +1,68 @@
+"""The pipe: parameters in, statics and steps out."""
+
+import numpy as np
+
+from . import integrator, model, recovery, statics
+from .integrator import PipeState, StepResult
+from .line import Array
+from .parameters import PipeParameters
+from .recovery import SectionForces
+from .so3 import matrix
+from .statics import Equilibrium
+
+
+class Pipe:
+    """A discretised pipe in its water. Holds no state: states are values handed in and out.
+
+    s (n,): arc lengths of the nodes [m]; line: element data. Raises ValueError for parameters that cannot be discretised.
+    """
+
+    def __init__(self, parameters: PipeParameters) -> None:
+        self.parameters = model.resolve(parameters)
+        self.s, self.line = model.discretize(self.parameters)
+        self.wall = recovery.wall(parameters, self.s)
+
+    def equilibrium(self, top: tuple[float, float, float], attitude: Array | None, time: float = 0.0) -> Equilibrium:
+        """Static equilibrium with the top at `top` (3,) [m], e, its section at `attitude` (4,), or as it hangs if None."""
+        return statics.solve(self.line, self.s, model.water(self.parameters, time), top, attitude)
+
+    def start(self, time: float) -> tuple[Equilibrium, PipeState]:
+        """Equilibrium at the parameters' own top pose, and the state of rest in it."""
+        attitude = np.array(self.parameters.top_quaternion)
+        found = self.equilibrium(self.parameters.top_position, attitude if attitude.any() else None, time)
+        return found, self.at_rest(found, time)
+
+    def at_rest(self, found: Equilibrium, time: float = 0.0) -> PipeState:
+        """State of rest in an equilibrium."""
+        return integrator.rest(self.line, found.position, found.quaternion, time)
+
+    def step(self, state: PipeState, velocity: Array, spin: Array, h: float) -> StepResult:
+        """Step of h [s] with the top's mean velocity and angular velocity (3,), e; the water is that of mid-step."""
+        return integrator.step(self.line, model.water(self.parameters, state.time + 0.5 * h), state, velocity, spin, h)
+
+    def energies(self, state: PipeState) -> tuple[float, float, float, float]:
+        """(kinetic, elastic, gravity, contact) [J]."""
+        return integrator.energy_of(self.line, state)
+
+    def section_forces(self, state: PipeState) -> SectionForces:
+        """Section forces at the nodes, material components."""
+        water = model.water(self.parameters, state.time)
+        wrenches = recovery.nodal_wrenches(self.line, water, state.position, state.quaternion, state.velocity, state.strain)
+        return SectionForces.of(wrenches)
+
+    def spatial_top(self, state: PipeState, wrench: Array) -> Array:
+        """Force and moment (6,), e, of material components (6,) at the top."""
+        r = np.array(matrix(tuple(state.quaternion[-1])))
+        return np.concatenate([r @ wrench[:3], r @ wrench[3:]])
+
+    def von_mises(self, state: PipeState, forces: SectionForces) -> Array:
+        """Largest von Mises stress (n,) [Pa] over the wall at every node."""
+        return recovery.von_mises(self.parameters, self.wall, state.position, forces)
+
+    def largest_bending_moment(self, forces: SectionForces) -> float:
+        """Largest bending moment [N m] along the line, between the nodes too."""
+        return recovery.largest_bending_moment(self.s, forces)
+
+    def stretched_length(self, state: PipeState) -> float:
+        """Length of the centreline [m], the paper's s_h of Fig. 4."""
+        return recovery.centreline_length(self.line.length, state.strain)

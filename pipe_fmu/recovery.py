@@ -1,0 +1,152 @@
+"""Section forces at the nodes, recovered from equilibrium of the elements' ends.
+
+A two-node element knows its section force only in the mean. What it hands to its node, less its own share of the distributed loads, is
+the section force at the node to the accuracy of the reactions; the elements left and right of a node are averaged. Tension is the effective
+tension; the wall's own, T_w = T - p_e A_e + p_i A_i, enters the stress.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .assembly import expand
+from .compiled import kernel
+from .element import ROWS, STRAINS, frame, gradients
+from .line import Array
+from .loads import add_contact, add_drag
+from .parameters import PipeParameters
+from .so3 import apply_transposed, matrix
+from .static_kernel import chord, spin
+
+
+class SectionForces(NamedTuple):
+    """Material components (along t_1, t_2, t_3) at the nodes."""
+
+    tension: Array  # (n,) effective tension n_1 [N]
+    shear: Array  # (n, 2) n_2, n_3 [N]
+    moment: Array  # (n, 3) torque m_1, bending moments m_2, m_3 [N m]
+
+    @classmethod
+    def of(cls, wrenches: Array) -> "SectionForces":
+        """From nodal wrenches (n, 6)."""
+        return cls(wrenches[:, 0], wrenches[:, 1:3], wrenches[:, 3:])
+
+
+def largest_bending_moment(s: Array, forces: SectionForces) -> float:
+    """Largest bending moment [N m] along the line, between the nodes `s` (n,) too.
+
+    |m|^2 is a cubic in every element: its slope at the nodes is 2 (m_2 n_3 - m_3 n_2) by eq. (26).
+    """
+    m2, m3 = forces.moment[:, 1], forces.moment[:, 2]
+    square = m2 * m2 + m3 * m3
+    slope = 2.0 * (m2 * forces.shear[:, 1] - m3 * forces.shear[:, 0])
+    h = np.diff(s)
+    a, b, da, db = square[:-1], square[1:], slope[:-1] * h, slope[1:] * h
+    x = np.linspace(0.0, 1.0, 17)[:, None]
+    cubic = a + x * (da + x * (3.0 * (b - a) - 2.0 * da - db + x * (2.0 * (a - b) + da + db)))
+    return math.sqrt(float(cubic.max()))
+
+
+@kernel
+def nodal_wrenches(line, water, position, quaternion, velocity, strain):
+    """Spatial section force and moment (n, 6) at the nodes, on the side towards the top."""
+    n = position.shape[0]
+    out = np.zeros((n, 6))
+    rows = np.empty((ROWS, 9))
+    nine = np.empty(9)
+    vector = np.empty(12)
+    unused = np.empty((12, 12))
+    ends = np.zeros((2, 6))
+    depths = np.empty(2)
+    for e in range(n - 1):
+        h = line.length[e]
+        rm, u, psi = frame(spin(quaternion, e), spin(quaternion, e + 1), chord(position, e))
+        gradients(rm, u, psi, h, line.share[e], rows)
+        weight = h * line.weight[e]
+        nine[:] = 0.0
+        for k in range(ROWS):
+            stress = h * line.stiffness[e, k] * strain[e, k] if k < STRAINS else -weight / 6.0
+            for i in range(9):
+                nine[i] += stress * rows[k, i]
+        expand(nine, vector)
+        vector[2] -= 0.5 * weight
+        vector[8] -= 0.5 * weight
+        depths[0], depths[1] = position[e, 2], position[e + 1, 2]
+        if water.drag:
+            for i in range(3):
+                ends[0, i], ends[1, i] = velocity[e, i], velocity[e + 1, i]
+            add_drag(rm, u, psi, h, line.drag[e], ends, depths, water.levels, water.velocities, 0.0, False, vector, unused)
+        if line.bed.shape[0] > 0:
+            add_contact(h, line.diameter[e], line.weight[e], depths[0], depths[1], strain[e, STRAINS], rows[STRAINS], vector, unused)
+        for i in range(6):
+            out[e, i] -= vector[i] * (1.0 if e == 0 else 0.5)
+            out[e + 1, i] += vector[6 + i] * (1.0 if e == n - 2 else 0.5)
+    for k in range(n):
+        r = matrix(spin(quaternion, k))
+        force = apply_transposed(r, (out[k, 0], out[k, 1], out[k, 2]))
+        moment = apply_transposed(r, (out[k, 3], out[k, 4], out[k, 5]))
+        for i in range(3):
+            out[k, i] = force[i]
+            out[k, 3 + i] = moment[i]
+    return out
+
+
+def centreline_length(line_length: Array, strain: Array) -> float:
+    """Length of the stretched centreline, the integral of |d phi / d S| [m]."""
+    return float(line_length @ (1.0 + strain[:, 0]))
+
+
+class Wall(NamedTuple):
+    """Tube wall and pressures at the nodes, for the stress; (n,) each. `area` is 0 where a section has no wall."""
+
+    area: Array  # m2
+    second_moment: Array  # m4
+    inner: Array  # m
+    outer: Array  # m
+    displaced: Array  # A_e, m2
+    contents: Array  # weight per volume of the contents, N/m3
+
+
+def wall(parameters: PipeParameters, s: Array) -> Wall:
+    """Wall at the nodes `s` (n,)."""
+    ends = np.cumsum([section.length or parameters.length for section in parameters.all_sections])
+    at = [parameters.all_sections[min(int(np.searchsorted(ends, x - 1e-9)), len(ends) - 1)] for x in s]
+    columns = [
+        (
+            one.steel_area if one.wall_thickness is not None else 0.0,
+            one.second_moment,
+            *one.radii,
+            one.outer_area,
+            one.contents_density * parameters.environment.gravity,
+        )
+        for one in at
+    ]
+    return Wall(*np.array(columns).T)
+
+
+def von_mises(parameters: PipeParameters, wall: Wall, position: Array, forces: SectionForces) -> Array:
+    """Largest von Mises stress (n,) [Pa] over the wall of a tube at every node: tension, bending, torsion and water pressure.
+
+    Thick-walled tube (Lame) under the pressure outside and, where the pipe is filled, the head of its contents inside. Nodes of sections
+    without a wall have stress 0.
+    """
+    if not wall.area.any():
+        return np.zeros(len(wall.area))
+    environment = parameters.environment
+    depth = np.maximum(0.0, position[:, 2] + environment.depth)
+    outside, inside = environment.water_density * environment.gravity * depth, wall.contents * depth
+    a, b, area = wall.inner, wall.outer, np.where(wall.area > 0.0, wall.area, np.inf)
+    second = np.where(wall.area > 0.0, wall.second_moment, np.inf)
+    axial = (forces.tension - outside * wall.displaced + inside * math.pi * a**2) / area
+    mean = (inside * a**2 - outside * b**2) * math.pi / area
+    largest = np.zeros(len(area))
+    for r in (a, b):
+        swing = (inside - outside) * math.pi * b**2 / area * np.where(r > 0.0, (a / np.maximum(r, 1e-9)) ** 2, 0.0)
+        radial, hoop = mean - swing, mean + swing
+        bending = np.hypot(forces.moment[:, 1], forces.moment[:, 2]) * r / second
+        twist = forces.moment[:, 0] * r / (2.0 * second)
+        for side in (axial + bending, axial - bending):
+            squares = (side - hoop) ** 2 + (hoop - radial) ** 2 + (radial - side) ** 2
+            largest = np.maximum(largest, np.sqrt(0.5 * squares + 3.0 * twist**2))
+    return largest

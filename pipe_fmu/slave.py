@@ -1,0 +1,158 @@
+"""The pipe as a co-simulation unit: names, units and meaning of its ports. Knows nothing of FMI; an adapter does the rest."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .integrator import WORKS
+from .line import Array
+from .model import resolve
+from .parameters import PipeParameters
+from .pipe import Pipe
+
+Port = tuple[int, str, str]
+
+_MOTION = "of the hang-off point, mean over the coming step, in e"
+_PULL = "of the pipe on the vessel at the hang-off point, in e"
+
+
+class PipeUnit:
+    """A pipe whose top follows the velocity it is given and answers with its pull."""
+
+    NAME = "pipe"
+    DESCRIPTION = "Geometrically exact submerged pipe hanging from a moving point; energy-consistent step"
+    PARAMETERS = PipeParameters
+    INPUTS: ClassVar[dict[str, Port]] = {
+        "velocity": (3, "m/s", f"velocity {_MOTION}"),
+        "angular_velocity": (3, "rad/s", f"angular velocity {_MOTION}"),
+    }
+
+    def __init__(self, parameters: PipeParameters) -> None:
+        self._pipe = Pipe(parameters)
+        self.state: Any = None
+        self._memo: dict[str, Array] = {}
+        self._memo_of: Any = None
+
+    @staticmethod
+    def outputs(parameters: PipeParameters) -> dict[str, Port]:
+        """Output ports (size, unit, description); physics that is absent has none."""
+        n = resolve(parameters).nodes
+        ports: dict[str, Port] = {
+            "force": (3, "N", f"force {_PULL}, mean over the step"),
+            "moment": (3, "N.m", f"moment {_PULL}, mean over the step"),
+            "end_force": (3, "N", f"force {_PULL}, at the end of the step"),
+            "end_moment": (3, "N.m", f"moment {_PULL}, at the end of the step"),
+            "top_position": (3, "m", "position of the top, in e"),
+            "top_quaternion": (4, "1", "attitude of the top section, scalar first"),
+            "impedance": (36, "N.s/m", "d(force, moment on the pipe) / d(velocity, angular velocity), row by row; SI"),
+            "kinetic_energy": (1, "J", "kinetic energy"),
+            "elastic_energy": (1, "J", "strain energy"),
+            "gravity_energy": (1, "J", "potential energy of the submerged weight, zero at the bed"),
+            "top_work": (1, "J", "work done on the pipe at its top since the start"),
+            "current_work": (1, "J", "work done on the pipe by the current since the start"),
+            "drag_dissipation": (1, "J", "energy dissipated by drag since the start"),
+            "rotational_dissipation": (1, "J", "energy dissipated by rotational damping since the start"),
+        }
+        for name, present in _optional(parameters).items():
+            if present:
+                ports[name] = (1, "J", name.replace("_", " ") + (" of the bed" if "contact" in name else " since the start"))
+        ports |= {
+            "pipe_length": (1, "m", "length of the stretched centreline"),
+            "largest_tension": (1, "N", "largest effective tension"),
+            "largest_bending_moment": (1, "N.m", "largest bending moment"),
+            "largest_von_mises": (1, "Pa", "largest von Mises stress in the wall"),
+            "newton_iterations": (1, "1", "corrections of the last step"),
+            "newton_residual": (1, "1", "residual of the last step over the largest element force"),
+            "s": (n, "m", "arc length of the nodes"),
+            "node_position": (3 * n, "m", "positions of the nodes, in e"),
+            "node_tension": (n, "N", "effective tension at the nodes"),
+            "node_moment": (3 * n, "N.m", "torque and bending moments at the nodes, material components"),
+            "node_shear": (2 * n, "N", "shear forces at the nodes, material components"),
+        }
+        return ports
+
+    def initialize(self, time: float, inputs: dict[str, Array]) -> str | None:
+        """Find the static equilibrium; a message if there is none."""
+        found, state = self._pipe.start(time)
+        if not found.converged:
+            return f"statics: no equilibrium after {found.iterations} corrections, residual {found.residual:.2e} of the weight"
+        still = np.zeros(3)
+        self._pipe.step(state, still, still, 1e-3)  # so that compiling its kernel belongs to the start, not to the first step
+        self.state = (state, found.top, found.stiffness, 0, found.residual)
+        return None
+
+    def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
+        """Advance by h [s]; a message, and the state unchanged, if Newton's method does not converge."""
+        result = self._pipe.step(self.state[0]._replace(time=time), inputs["velocity"], inputs["angular_velocity"], h)
+        if not result.converged:
+            return (
+                f"step of {h:g} s at t = {time:g} s: no convergence after {result.iterations} corrections, "
+                f"residual {result.residual:.2e} of the largest section force"
+            )
+        self.state = (result.state, result.top, result.impedance, result.iterations, result.residual)
+        return None
+
+    def output(self, name: str) -> Array:
+        """Values (size,) of a port, computed when first asked for in a state."""
+        if self._memo_of is not self.state:
+            self._memo_of, self._memo = self.state, {}
+        if name not in self._memo:
+            self._compute(name)
+        return self._memo[name]
+
+    def _compute(self, name: str) -> None:
+        state, top, impedance, iterations, residual = self.state
+        memo = self._memo
+        if name in ("force", "moment"):
+            memo["force"], memo["moment"] = -top[:3], -top[3:]
+        elif name == "top_position":
+            memo[name] = state.position[-1]
+        elif name == "top_quaternion":
+            memo[name] = state.quaternion[-1]
+        elif name == "impedance":
+            memo[name] = np.ravel(impedance)
+        elif name.endswith("_energy"):
+            kinds = ("kinetic_energy", "elastic_energy", "gravity_energy", "contact_energy")
+            memo |= {kind: np.array([value]) for kind, value in zip(kinds, self._pipe.energies(state), strict=True)}
+        elif name == "top_work":
+            memo[name] = np.array([state.top_work])
+        elif name == "current_work":
+            memo[name] = np.array([state.works[WORKS.index("current")]])
+        elif name.endswith("_dissipation"):
+            memo[name] = np.array([state.works[WORKS.index(name.removesuffix("_dissipation"))]])
+        elif name == "pipe_length":
+            memo[name] = np.array([self._pipe.stretched_length(state)])
+        elif name == "newton_iterations":
+            memo[name] = np.array([float(iterations)])
+        elif name == "newton_residual":
+            memo[name] = np.array([residual])
+        elif name == "s":
+            memo[name] = self._pipe.s
+        elif name == "node_position":
+            memo[name] = state.position.ravel()
+        else:
+            self._recover(state)
+
+    def _recover(self, state: Any) -> None:
+        forces = self._pipe.section_forces(state)
+        wrench = np.concatenate([[forces.tension[-1]], forces.shear[-1], forces.moment[-1]])
+        end = self._pipe.spatial_top(state, wrench)
+        self._memo |= {
+            "node_tension": forces.tension,
+            "node_moment": forces.moment.ravel(),
+            "node_shear": forces.shear.ravel(),
+            "largest_tension": np.array([forces.tension.max()]),
+            "largest_bending_moment": np.array([self._pipe.largest_bending_moment(forces)]),
+            "largest_von_mises": np.array([self._pipe.von_mises(state, forces).max()]),
+            "end_force": -end[:3],
+            "end_moment": -end[3:],
+        }
+
+
+def _optional(parameters: PipeParameters) -> dict[str, bool]:
+    return {
+        "contact_energy": parameters.seabed is not None,
+        "contact_dissipation": parameters.seabed is not None,
+        "internal_dissipation": parameters.internal_damping > 0.0,
+        "numerical_dissipation": parameters.numerical_damping > 0.0,
+    }

@@ -1,0 +1,151 @@
+"""Short runs through real FMUs: passivity, loads from a table, a prescribed top, and sabotage that must not go unseen."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from master import drive, scene
+from master.__main__ import main
+from master.bond import FmuEnd, mobility_end
+from master.drive import open_drive
+from master.ledger import EnergyCheckFailed
+from master.prepared import prepare
+
+ROUND_OFF = 1e-12  # of the largest term of the energy
+BUSY = ["environment.current.start=0", "environment.current.ramp=4", "vessel.controller.start=2", "simulation.snapshots=[]"]
+
+
+def marched(name, changes, macro_step, duration):
+    """Rows of the ledger (steps + 1, columns) by name, after a run of `duration`."""
+    loaded = scene.load(name, [*changes, f"simulation.duration={duration}", f"simulation.macro_step={macro_step}",
+                               f"simulation.recording_step={duration}"])  # fmt: skip
+    with open_drive(loaded.sections, prepare(loaded)) as moving:
+        rows = [moving.ledger.row]
+        while moving.time < duration:
+            moving.advance(duration)
+            rows.append(moving.ledger.row)
+        return dict(zip(moving.ledger.names, np.array(rows).T, strict=True))
+
+
+def total(rows, *endings):
+    return sum(values for name, values in rows.items() if name.endswith(endings))
+
+
+@pytest.mark.parametrize("macro_step", [0.05, 0.2, 1.0])
+@pytest.mark.parametrize(("name", "changes"), [("free-decay", []), ("paper", BUSY)], ids=["free decay", "current, control"])
+def test_energy_less_what_is_supplied_never_rises(name, changes, macro_step):
+    """Eqs. (80), (87), (89), (90): E' <= supplied power, in every step of any length."""
+    rows = marched(name, changes, macro_step, 10.0)
+    works = total(rows, "current_work", "control_work", "environment_work")
+    energy = total(rows, "_energy")
+    largest = max(np.abs(values).max() for values in rows.values())
+    assert np.diff(energy - works).max() <= ROUND_OFF * largest
+    assert total(rows, "_dissipation")[-1] > 1e3
+    if name == "free-decay":
+        assert rows["pipe.current_work"][-1] == rows["vessel.current_work"][-1] == 0.0
+
+
+class Sabotaged(FmuEnd):
+    """A connection to the vessel that reverses the force, or turns its axes round."""
+
+    def solve(self, time, step, held):
+        return super().solve(time, step, self.wrong(held))
+
+
+WRONG = {
+    "reversed": lambda held: -held,
+    "force reversed": lambda held: held * [-1, -1, -1, 1, 1, 1],
+    "axes exchanged": lambda held: held[[1, 0, 2, 3, 4, 5]],
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
+def test_a_wrong_connection_fails_the_energy_check_with_exit_code_1(monkeypatch, tmp_path, capsys, wrong):
+    def connect(fmu, bond):
+        good = mobility_end(fmu, bond)
+        good.__class__, good.wrong = Sabotaged, wrong
+        return good
+
+    monkeypatch.setattr(drive, "mobility_end", connect)
+    changes = [f"--set={change}" for change in ("simulation.duration=5", "simulation.recording_step=1", *BUSY)]
+    assert main(["run", *changes, "-o", str(tmp_path)]) == 1
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["status"] == "stopped"
+    assert not summary["energy_check_passed"]
+    assert re.search(r"energy check +failed at", capsys.readouterr().out)
+
+
+def test_a_load_from_a_table_does_the_work_that_it_gives(tmp_path):
+    push = "tables.environment=[{time=0}, {time=1, force=[0, 2e5, 0]}, {time=9, force=[0, 2e5, 0]}]"
+    rows = marched("free-decay", [push], 0.1, 4.0)
+    assert rows["vessel.environment_work"][-1] > 1e3
+    assert abs(rows["closure"]).max() <= 1e-8 * rows["exchanged"][-1]
+
+
+def test_a_prescribed_top_goes_exactly_where_it_should():
+    loaded = scene.load("heave", ["simulation.duration=4", "simulation.recording_step=4", "top_motion.ramp=0"])
+    with open_drive(loaded.sections, prepare(loaded)) as moving:
+        while moving.time < 4.0:
+            moving.advance(4.0)
+        position = moving.units["pipe"].get("top_position")
+        motion = loaded.sections.top_motion
+        np.testing.assert_allclose(position, np.add(motion.displacement(4.0), (800.0, 0.0, -800.0)), atol=1e-11)
+        assert moving.ledger.largest_closure <= 1e-8 * moving.ledger.exchanged
+        assert moving.effort.pipe_solves == moving.effort.macro_steps == 40
+
+
+def test_a_prescribed_top_is_watched_too():
+    """A pipe that reports half the work done on it does not go unseen."""
+    loaded = scene.load("heave", ["simulation.duration=4", "simulation.recording_step=4"])
+    with open_drive(loaded.sections, prepare(loaded)) as moving:
+        pipe = moving.units["pipe"]
+        honest = pipe.get
+
+        def get(names):
+            values = honest(names)
+            if "top_work" in names:
+                values[names.index("top_work")] *= 0.5
+            return values
+
+        pipe.get = get
+        with pytest.raises(EnergyCheckFailed, match="energy check failed"):
+            moving.advance(4.0)
+
+
+def test_a_bad_value_in_a_units_table_is_a_mistake_of_the_user(capsys, tmp_path):
+    assert main(["run", "--set", "pipe.section.outer_diameter=-0.4", "-o", str(tmp_path / "out")]) == 2
+    assert "pipe.section.outer_diameter = -0.4: must be > 0 m" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
+    assert main(["export", "-o", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.split() == [str(tmp_path / "pipe.fmu"), str(tmp_path / "vessel.fmu")]
+    loaded = scene.load("paper")
+    exported = replace(prepare(loaded), fmus={name: tmp_path / f"{name}.fmu" for name in ("pipe", "vessel")})
+    with open_drive(loaded.sections, exported) as moving:
+        gap = drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
+        assert max(gap.values()) < 1e-9
+
+
+def test_statics_prints_the_equilibrium_as_json(capsys):
+    assert main(["statics", "paper", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {
+        "top_force_e_N", "top_moment_e_N_m", "foot_force_e_N", "foot_moment_e_N_m", "top_tension_N", "stretch_m",
+        "lowest_point_m", "touchdown_s_m", "s_m", "position_e_m", "tension_N", "bending_moment_N_m", "shear_N",
+    } <= set(found)  # fmt: skip
+    assert found["touchdown_s_m"] is None
+    assert found["top_tension_N"] == pytest.approx(np.linalg.norm(found["top_force_e_N"]), rel=1e-4)  # it hangs freely
+    weight = 759.1353686 * 1200.0
+    assert found["top_force_e_N"][2] + found["foot_force_e_N"][2] == pytest.approx(-weight, rel=1e-9)
+
+
+def test_statics_prints_a_table(capsys):
+    assert main(["statics", "pipelay", "--set", "start.x=780"]) == 0
+    printed = capsys.readouterr().out
+    assert "top tension" in printed
+    assert "touchdown at    S =" in printed

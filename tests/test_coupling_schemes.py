@@ -1,0 +1,189 @@
+"""Theorems of the coupling, on a spring (with or without a mass of its own) tied to a body, both FMUs, through FMPy."""
+
+import numpy as np
+import pytest
+from units.toys import build_pair, tied
+
+from master.bond import hang_off
+from master.coupling import CouplingFailed, coupling
+from master.extrapolation import Extrapolation
+from master.fmu import FmuFailed
+
+PUSH = {"start_velocity": [1.0, 0.5, 0.0], "start_rotation": [0.0, 0.2, -0.1]}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PIPELAY_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield build_pair(tmp_path_factory.mktemp("fmus"), failure={"above": 1e9})
+
+
+def energy(pair) -> float:
+    stored = pair.spring.get(("kinetic_energy", "elastic_energy")).sum()
+    return float(stored + pair.body.get(("kinetic_energy", "restoring_energy")).sum())
+
+
+@pytest.mark.parametrize("by_port", [True, False])
+@pytest.mark.parametrize("mass", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("hardening", [0.0, 100.0])
+def test_the_bond_makes_no_energy_at_any_mass_ratio(files, mass, hardening, by_port):
+    # Z Y = (2 m / H + ..) (H / 2 M) exceeds 1 for the light body: fixed-point iteration would diverge there
+    spring = {"hardening": hardening, "inertia": 1.0, "damping": 0.05}
+    body = {"mass": mass, "inertia": mass, "damping": 0.1, "load": [0.3, 0.0, 0.0], **PUSH}
+    with tied(files, spring, body, 0.1, by_port=by_port, tolerance=1e-13) as pair:
+        pair.run(0.1, 5.0)
+        ledger, counters = pair.ledger, pair.coupling.counters
+        assert ledger.interface_residual <= 1e-12 * ledger.exchanged
+        assert ledger.largest_closure <= 1e-12 * ledger.exchanged
+        assert counters.rejected_steps == 0
+        assert ledger.exchanged > 0.0
+        if hardening == 0.0 and by_port:
+            assert np.median(counters.rounds) == 2
+
+
+def test_a_linear_step_costs_two_solves_of_the_impedance_end(files):
+    with tied(files, {}, {"mass": 50.0, **PUSH}, 0.1) as pair:
+        pair.run(0.1, 10.0)
+        assert pair.coupling.impedance.solves <= 2 * pair.coupling.counters.steps + 1
+        assert pair.coupling.mobility.solves <= 3 * pair.coupling.counters.steps + 1
+
+
+def test_the_bond_leaves_no_kinematic_gap(files):
+    with tied(files, {"hardening": 10.0}, PUSH, 0.1) as pair:
+        pair.run(0.1, 5.0)
+        np.testing.assert_allclose(pair.spring.get("stretch"), pair.body.get("position"), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("hardening", [0.0, 5.0])
+def test_second_order_in_the_macro_step(files, hardening):
+    # against x'' = -k x where it is linear, against H / 16 where it is not
+    def end(step):
+        with tied(files, {"hardening": hardening}, {**PUSH, "mass": 2.0}, step) as pair:
+            pair.run(step, 2.0)
+            return pair.state
+
+    exact = end(0.1 / 16)
+    if hardening == 0.0:
+        w, v = np.sqrt([0.5] * 3 + [1.0] * 3), np.array([1.0, 0.5, 0.0, 0.0, 0.2, -0.1])
+        exact = np.concatenate([v * np.sin(2.0 * w) / w, v * np.cos(2.0 * w)])
+    coarse, fine = (np.linalg.norm(end(step) - exact) for step in (0.1, 0.05))
+    assert 1.9 < np.log2(coarse / fine) < 2.1
+
+
+@pytest.mark.parametrize(("step", "stable"), [(1.9, True), (2.1, False)])
+def test_serial_exchange_of_end_values_is_stable_up_to_two(files, step, stable):
+    with tied(files, {}, PUSH, step, scheme="serial", checked=False) as pair:
+        pair.run(step, 200 * step)
+        assert (np.abs(pair.spring.get("stretch")).max() < 100.0) == stable
+
+
+def test_parallel_exchange_gains_energy_even_at_short_steps(files):
+    with tied(files, {}, PUSH, 0.05, scheme="parallel", checked=False) as pair:
+        before = energy(pair)
+        pair.run(0.05, 100.0)
+        assert energy(pair) > 3.0 * before
+
+
+@pytest.mark.parametrize("step", [2.1, 1000.0])
+def test_the_energy_consistent_step_is_stable_at_any_length(files, step):
+    with tied(files, {}, PUSH, step) as pair:
+        before = energy(pair)
+        pair.run(step, 100 * step)
+        assert energy(pair) == pytest.approx(before, rel=1e-9)
+        assert pair.coupling.counters.rejected_steps == 0
+
+
+def test_an_undamped_pair_keeps_its_energy_and_a_damped_one_loses_it(files):
+    for damping in (0.0, 0.3):
+        with tied(files, {"hardening": 100.0, "damping": damping}, PUSH, 0.2, tolerance=1e-13) as pair:
+            energies = [energy(pair)]
+            for i in range(50):
+                pair.run_one(i * 0.2, 0.2)
+                energies.append(energy(pair))
+        change = np.diff(energies)
+        assert (change <= 1e-12 * energies[0]).all()
+        assert (change.sum() < -0.1 * energies[0]) == (damping > 0.0)
+
+
+def test_a_discarded_step_is_halved_and_the_step_recovers(files):
+    spring = {"failure.above": 0.03, "failure.start": 0.5, "failure.end": 1.0}
+    with tied(files, spring, PUSH, 0.1) as pair, tied(files, {}, PUSH, 0.1) as reference:
+        lengths = []
+        time = 0.0
+        while time < 2.0 - 1e-9:
+            end = 0.1 * (np.floor(time / 0.1 + 1e-9) + 1)
+            lengths.append((time, pair.coupling.advance(time, end - time).step))
+            time += lengths[-1][1]
+        reference.run(0.1, 2.0)
+        assert pair.coupling.counters.rejected_steps >= 2
+        assert max(step for start, step in lengths if 0.5 <= start < 1.0 - 1e-9) <= 0.03
+        assert lengths[-1][1] == pytest.approx(0.1)
+        assert pair.ledger.largest_closure <= 1e-10 * pair.ledger.exchanged
+        np.testing.assert_allclose(pair.state, reference.state, atol=3e-3)  # two step lengths: truncation error only
+
+
+@pytest.mark.parametrize(("scheme", "kind"), [("energy-consistent", "message"), ("serial", "arithmetic")])
+def test_a_step_that_fails_at_every_length_ends_the_coupling_with_the_fmus_words(files, scheme, kind):
+    spring = {"failure.above": 0.0, "failure.start": 0.5, "failure.kind": kind}
+    with tied(files, spring, PUSH, 0.1, scheme=scheme, checked=False) as pair:
+        with pytest.raises(CouplingFailed, match=r"coupling failed at 0.5 s .* spring: step .* planted") as caught:
+            pair.run(0.1, 1.0)
+        assert caught.value.time == pytest.approx(0.5)
+        assert "\n" not in str(caught.value)
+        assert (caught.value.step < 0.1 / 2000) == (scheme == "energy-consistent")
+
+
+def test_a_bug_in_an_fmu_is_not_met_with_shorter_steps(files):
+    spring = {"failure.above": 0.0, "failure.kind": "bug"}
+    with tied(files, spring, PUSH, 0.1) as pair, pytest.raises(FmuFailed, match="RuntimeError: planted bug, 100 % certain"):
+        pair.run(0.1, 1.0)
+
+
+def test_a_wrong_impedance_port_only_costs_rounds(files):
+    # the port is believed at first; from the eighth round on difference quotients take over
+    with tied(files, {"hardening": 1.0}, {"mass": 0.1, **PUSH}, 0.5) as pair:
+        pair.coupling.impedance._sign = 3.0
+        pair.run(0.5, 5.0)
+        assert max(pair.coupling.counters.rounds) > 8
+        assert pair.ledger.largest_closure <= 1e-9 * pair.ledger.exchanged
+
+
+def test_a_rejected_step_leaves_no_trace(files):
+    # the same steps, once with rejections before them
+    states = []
+    for refusals in (0, 3):
+        left = [refusals]
+
+        def check(step, left=left):
+            left[0] -= 1
+            return left[0] < 0
+
+        with tied(files, {"hardening": 1.0}, PUSH, 0.1) as pair:
+            pair.coupling.check = check
+            pair.coupling.wanted = 0.1 / 2 ** (3 - refusals)
+            pair.coupling.advance(0.0, 0.1)
+            states.append((pair.state, pair.coupling.counters.rejected_steps))
+    np.testing.assert_array_equal(states[0][0], states[1][0])
+    assert (states[0][1], states[1][1]) == (0, 3)
+
+
+def test_all_saved_states_are_freed(files):
+    with tied(files, {"hardening": 100.0}, PUSH, 0.5) as pair:
+        pair.run(0.5, 5.0)
+        assert pair.spring._states == pair.body._states == set()
+
+
+def test_unknown_scheme_is_refused():
+    with pytest.raises(ValueError, match="scheme = 'magic': must be one of energy-consistent, serial, parallel"):
+        coupling("magic", None, None, hang_off(), 0.1)
+
+
+def test_extrapolation_of_a_parabola_over_uneven_steps_is_exact():
+    def value(time):
+        return np.array([time**2, 1.0]), np.array([3.0, -(time**2)])
+
+    guess = Extrapolation(*value(0.0), lambda error: float(np.abs(error).max()))
+    for time in (0.1, 0.15, 0.4, 0.6, 0.7):
+        guess.add(time, *value(time))
+    np.testing.assert_allclose(np.concatenate(guess.at(1.0)), np.concatenate(value(1.0)), rtol=1e-12)

@@ -1,0 +1,342 @@
+"""The time step: energy identity, dissipations, momenta, orders, tangent, impedance, and what it does when it fails."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from pipe_helpers import (
+    HANGING,
+    P16,
+    TANGENT,
+    TANGENT_ATTITUDE,
+    balance,
+    bar,
+    centres,
+    free_step,
+    march,
+    pitch,
+    rotation,
+    rotation_vector_quaternion,
+    sea,
+    started,
+    step_system,
+    straight,
+)
+
+from pipe_fmu import AddedMass, PipeParameters, PipeUnit, Seabed, model, step_kernel
+from pipe_fmu.integrator import WORKS
+
+TWO = (replace(P16, length=500.0), replace(P16, length=700.0, wall_thickness=0.0254, coating_thickness=0.02, coating_density=2000.0))
+BED = {"seabed": Seabed(damping=1.0, friction=0.5), "top_position": (780.0, 0.0, -800.0)}
+PINNED_TOP = {"top": "pinned", "top_quaternion": HANGING}
+SCENES = {
+    "current": {},
+    "bed": BED,
+    "added-mass": {"added_mass": AddedMass(1.0)},
+    "internal-damping": {"internal_damping": 0.02},
+    "numerical-damping": {"numerical_damping": 0.1},
+    "sections": {"sections": TWO},
+    "pinned-foot": {"foot": "pinned"},
+    "pinned-top": PINNED_TOP,
+}
+SCENES["everything"] = {key: value for part in SCENES.values() for key, value in part.items() if part is not PINNED_TOP}
+
+
+def scene(name, **changes):
+    base = {"nodes": 24, "top_position": TANGENT, "top_quaternion": TANGENT_ATTITUDE, "environment": sea(800.0, 0.8)}
+    return PipeParameters(**(base | SCENES[name] | changes))
+
+
+def sway(t):
+    """Top motion in all directions with pitch; a metre and a half, periods about 10 s, smooth start."""
+    rise = 1.0 - math.exp(-((t / 3.0) ** 2))
+    way = [1.0 * math.sin(0.4 * t), 0.8 * rise * math.sin(0.5 * t + 0.3), -1.5 * math.sin(0.6 * t)]
+    return rise * np.array(way), 0.04 * rise * math.sin(0.55 * t)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_energy_identity_and_dissipations_at_any_step(name):
+    """Energy created per step <= 1e-10 of summed absolute works and changes + 1e-14 of energies; no dissipation negative."""
+    pipe, _, start = started(scene(name))
+    for h, count in ((1e-3, 10), (0.05, 20), (0.2, 20), (1.0, 12), (2.0, 8)):
+        states, _ = march(pipe, start, sway, h, count)
+        for old, new in pairwise(states):
+            created, allowed = balance(pipe, old, new)
+            assert abs(created) <= allowed, f"step of {h} s at {old.time} s"
+            lost = dict(zip(WORKS, new.works - old.works, strict=True))
+            del lost["current"]
+            assert min(lost.values()) >= 0.0
+
+
+def test_each_dissipation_is_there_when_named_and_only_then():
+    present = {
+        "bed": "contact",
+        "internal-damping": "internal",
+        "numerical-damping": "numerical",
+    }
+    for name, extra in {"current": None, **present}.items():
+        pipe, _, start = started(scene(name))
+        states, _ = march(pipe, start, sway, 0.2, 15)
+        works = dict(zip(WORKS, states[-1].works, strict=True))
+        assert works["drag"] > 0.0
+        assert works["current"] != 0.0
+        assert works["rotational"] > 0.0
+        for kind in present.values():
+            assert (works[kind] > 0.0) == (kind == extra)
+
+
+def test_bed_friction_and_bed_damping_each_dissipate():
+    lost = []
+    for bed in (Seabed(damping=0.0, friction=0.0), Seabed(damping=1.0, friction=0.0), Seabed(damping=0.0, friction=0.5)):
+        pipe, _, start = started(scene("bed", seabed=bed))
+        states, _ = march(pipe, start, sway, 0.2, 15)
+        lost.append(states[-1].works[WORKS.index("contact")])
+    assert lost[0] == 0.0
+    assert lost[1] > 1.0
+    assert lost[2] > 1.0
+
+
+def test_internal_damping_quiets_an_axial_wave():
+    """Kelvin-Voigt: kinetic energy left after a jerk of the top falls with the damping time."""
+    left = []
+    for time in (0.0, 0.05):
+        pipe, _, start = started(scene("current", internal_damping=time, environment=sea(800.0)))
+        states, _ = march(pipe, start, lambda t: (np.array([0.0, 0.0, -min(t, 0.1)]), 0.0), 0.02, 60)
+        left.append(pipe.energies(states[-1])[0])
+    assert left[1] < 0.5 * left[0]
+
+
+def test_time_reverses_without_dissipation():
+    """The conserving step is symmetric: thrown back with the opposite velocities the line returns to where it came from."""
+    still = replace(P16, drag_normal=0.0, drag_tangential=0.0, rotational_damping=(0.0, 0.0, 0.0))
+    pipe, _, start = started(scene("current", section=still, environment=sea(800.0)))
+    there, _ = march(pipe, start, sway, 0.1, 10)
+    last = there[-1]
+    back = last._replace(velocity=-last.velocity, rate=-last.rate, last=-last.last, before=-last.before, time=0.0)
+    home, _ = march(pipe, back, lambda t: sway(1.0 - t), 0.1, 10)
+    np.testing.assert_allclose(home[-1].position, start.position, atol=1e-6)
+    np.testing.assert_allclose(home[-1].velocity, 0.0, atol=1e-5)
+
+
+def tumbling():
+    """A free bar bent to an arc, tumbling and swaying."""
+    s, line = bar(10.0, 7, axial=1e5, shear=5e4, torsion=80.0, bending=120.0, bending_3=90.0, mass=2.0, inertia=1e-2)
+    kappa, omega = 0.15, np.array([0.5, -0.8, 0.6])
+    position = np.column_stack([np.sin(kappa * s) / kappa, 0 * s, -(1 - np.cos(kappa * s)) / kappa])
+    attitude = np.array([pitch(kappa * x) for x in s])
+    velocity = np.cross(omega, centres(line, position, attitude)) + [1.0, 0.3, -0.4] + 0.3 * np.sin(s)[:, None] * [0.0, 1.0, 0.5]
+    return line, (position, attitude, velocity, np.array([rotation(q).T @ omega for q in attitude]))
+
+
+def momenta(line, state):
+    position, attitude, velocity, rate = state
+    p = line.mass[:, None] * velocity
+    centre = centres(line, position, attitude)
+    spins = [rotation(q) @ (j * w) for q, j, w in zip(attitude, line.inertia, rate, strict=True)]
+    return p.sum(axis=0), np.cross(centre, p).sum(axis=0) + np.sum(spins, axis=0)
+
+
+def test_a_free_line_keeps_its_linear_momentum_exactly_and_its_angular_momentum_to_second_order():
+    line, start = tumbling()
+    linear, angular = momenta(line, start)
+    errors = []
+    for h in (0.02, 0.01):
+        state = start
+        for _ in range(round(0.4 / h)):
+            state = free_step(line, state, h)
+        p, spin = momenta(line, state)
+        np.testing.assert_allclose(p, linear, rtol=1e-13)
+        errors.append(np.linalg.norm(spin - angular) / np.linalg.norm(angular))
+    assert errors[0] < 1e-5
+    assert math.log2(errors[0] / errors[1]) > 1.7
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.5])
+def test_mean_force_of_a_rigid_turn_is_the_average_of_the_turning_force(angle):
+    """Stretched line turned as a whole in one step: magnitude sinc(angle / 2) of the tension (0.98962 at 0.5 rad), to 1e-3."""
+    tension, axial, n = 9e5, 5e9, 9
+    s, line = bar(100.0, n, axial=axial, shear=1e9, torsion=1e8, bending=1e8)
+    line = line._replace(mass=0.0 * line.mass, inertia=0.0 * line.inertia)
+    position, attitude = straight(s)
+    position = position * (1 + tension / axial)
+    theta = np.array([0.0, angle, 0.0])
+    turn = rotation(rotation_vector_quaternion(theta))
+    x = np.hstack([position @ turn.T - position, np.tile(theta, (n, 1))])
+    zero = np.zeros((n, 3))
+    ends = step_system(line, (position, attitude, zero, zero), x, 1.0)[0].reshape(n, 6)
+    average = tension * np.array([math.sin(angle) / angle, 0.0, -(1 - math.cos(angle)) / angle])
+    assert np.linalg.norm(average) / tension == pytest.approx(math.sin(0.5 * angle) / (0.5 * angle), rel=1e-12)
+    np.testing.assert_allclose(ends[-1, :3], average, atol=1e-3 * tension)
+    np.testing.assert_allclose(ends[0, :3], -average, atol=1e-3 * tension)
+    np.testing.assert_allclose(ends[1:-1], 0.0, atol=1e-9 * tension)  # and nothing in between
+
+
+@pytest.mark.parametrize("name", ["current", "bed", "internal-damping", "numerical-damping", "added-mass"])
+def test_tangent_of_the_step_is_the_derivative_of_its_residual(name):
+    """At small increments; what is left out (second order of the step, friction's and drag's turning) stays below 1e-3."""
+    pipe, _, state = started(scene(name, nodes=6, length=150.0, top_position=(100.0, 0.0, -90.0), **PINNED_TOP, environment=sea(90.0, 0.8)))
+    random = np.random.default_rng(1)
+    h, n = 0.1, 6
+    old = state.position, state.quaternion, 0.05 * random.normal(size=(n, 3)), 1e-3 * random.normal(size=(n, 3))
+    x = np.hstack([h * old[2], 1e-4 * random.normal(size=(n, 3))])
+    water = model.water(pipe.parameters, 0.0)
+    tangent = step_system(pipe.line, old, x, h, water)[1]
+    got = np.empty_like(tangent)
+    for k in range(6 * n):
+        d = np.zeros(6 * n)
+        d[k] = 1e-6
+        up, down = (step_system(pipe.line, old, x + sign * d.reshape(n, 6), h, water)[0] for sign in (1, -1))
+        got[:, k] = (up - down) / 2e-6
+    for rows in (slice(0, 3), slice(3, 6)):
+        for columns in (slice(0, 3), slice(3, 6)):
+            a, b = (m.reshape(n, 6, n, 6)[:, rows, :, columns] for m in (tangent, got))
+            np.testing.assert_allclose(a, b, atol=1e-3 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("name", ["current", "pinned-top", "added-mass"])
+def test_impedance_is_the_difference_of_top_forces_by_top_velocities(name):
+    pipe, _, start = started(scene(name))
+    state = march(pipe, start, sway, 0.1, 5)[0][-1]
+    v, w, h = np.array([0.2, 0.1, -0.3]), np.array([0.0, 0.01, 0.0]), 0.1
+    impedance = pipe.step(state, v, w, h).impedance
+    for k in range(6):
+        change = np.zeros(6)
+        change[k] = 1e-5
+        up, down = (pipe.step(state, v + sign * change[:3], w + sign * change[3:], h).top for sign in (1, -1))
+        slope = (up - down) / 2e-5
+        np.testing.assert_allclose(impedance[:, k], slope, atol=5e-3 * np.abs(slope).max() + 1e-6 * np.abs(impedance).max())
+    if name == "pinned-top":
+        assert not impedance[3:].any()
+        assert not impedance[:, 3:].any()
+    assert np.linalg.eigvalsh(impedance + impedance.T)[0] > -1e-6 * np.abs(impedance).max()  # it resists
+
+
+@pytest.mark.parametrize("size", [1e-4, 0.05])
+@pytest.mark.parametrize("name", ["current", "everything"])
+def test_residual_is_the_same_with_and_without_its_tangent(name, size):
+    pipe, _, state = started(scene(name, nodes=10))
+    random = np.random.default_rng(2)
+    x = size * random.normal(size=(10, 6))
+    water = model.water(pipe.parameters, 0.0)
+    both = []
+    for fresh in (True, False):
+        system = np.empty((10, 6, 6)), np.empty((9, 6, 6)), np.empty((9, 6, 6)), np.empty((10, 6))
+        strain, works = np.empty((9, 7)), np.empty(6)
+        old = state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain
+        scales = step_kernel.step_system(pipe.line, water, 0.1, *old, x, strain, fresh, system, works)
+        both.append((system[3], strain, works, scales))
+    for one, other in zip(*both, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-12 * np.abs(one).max())
+
+
+def with_added_mass():
+    """Straight line along e1 with 40 kg/m of its own and 25 kg/m of water across."""
+    s, line = bar(60.0, 7, axial=1e8, shear=1e8, torsion=1e6, bending=1e6, mass=40.0)
+    ends = np.diff(s, prepend=s[0], append=s[-1])
+    across = 25.0 * 0.5 * (ends[:-1] + ends[1:])
+    return line._replace(added_mass=np.column_stack([0.0 * across, across, across])), *straight(s)
+
+
+@pytest.mark.parametrize(("way", "mass"), [(0, 40.0), (1, 65.0), (2, 65.0)])
+def test_added_mass_resists_acceleration_across_and_not_along(way, mass):
+    """From rest to v in a step of mean velocity v / 2: force = m v / h, over the whole line."""
+    line, position, attitude = with_added_mass()
+    h, v = 0.1, 0.3 * np.eye(3)[way]
+    x = np.hstack([np.tile(0.5 * h * v, (7, 1)), np.zeros((7, 3))])
+    zero = np.zeros((7, 3))
+    force = step_system(line, (position, attitude, zero, zero), x, h)[0].reshape(7, 6)[:, :3].sum(axis=0)
+    np.testing.assert_allclose(force, mass * 60.0 * v / h, atol=1e-6)
+
+
+def test_steady_oblique_motion_feels_munks_moment():
+    """Kirchhoff: a body towed steadily at v needs the moment v x M_a v, and no force, whatever the angle."""
+    line, position, attitude = with_added_mass()
+    h, v = 0.1, np.array([0.6, 0.2, -0.3])
+    velocity = np.tile(v, (7, 1))
+    x = np.hstack([h * velocity, np.zeros((7, 3))])
+    residual = step_system(line, (position, attitude, velocity, 0 * velocity), x, h, flow=velocity)[0].reshape(7, 6)
+    np.testing.assert_allclose(residual[:, :3], 0.0, atol=1e-6)
+    moment = residual[:, 3:].sum(axis=0)
+    np.testing.assert_allclose(moment, 60.0 * np.cross(v, [0.0, 25.0 * v[1], 25.0 * v[2]]), atol=1e-6)
+
+
+def ramped(t):
+    """Smooth start to speed: three derivatives vanish at t = 0."""
+    rise = 1.0 - math.exp(-((t / 4.0) ** 4))
+    return rise * np.array([0.6 * math.sin(0.5 * t), 0.5 * math.sin(0.4 * t), -1.0 * math.sin(0.5 * t)]), 0.02 * rise * math.sin(0.5 * t)
+
+
+def test_second_order_in_time():
+    """Positions and top force at 8 s, against steps sixteen times shorter; axial ringing damped by the material."""
+    pipe, _, start = started(scene("added-mass", internal_damping=0.05))
+    found = []
+    for h in (0.1, 0.05, 0.00625):
+        states, results = march(pipe, start, ramped, h, round(8.0 / h) + 1)
+        force = 0.5 * (results[-1].top + results[-2].top)  # means over the steps before and after 8 s
+        found.append((states[-2].position, force[:3]))
+    for k in range(2):
+        coarse, fine = (np.linalg.norm(found[i][k] - found[2][k]) for i in range(2))
+        assert math.log2(coarse / fine) > 1.85
+
+
+def test_newton_needs_few_corrections_at_a_tenth_of_a_second():
+    pipe, _, start = started(scene("bed", nodes=48))
+    _, results = march(pipe, start, sway, 0.1, 60)
+    assert np.median([result.iterations for result in results]) <= 4
+    assert all(result.residual <= 1e-9 for result in results)
+
+
+def test_no_motion_of_the_top_leaves_the_equilibrium_alone():
+    for name in ("current", "bed", "pinned-top"):
+        pipe, found, start = started(scene(name))
+        states, results = march(pipe, start, lambda t: (np.zeros(3), 0.0), 0.1, 20)
+        np.testing.assert_allclose(states[-1].position, start.position, atol=1e-6)
+        np.testing.assert_allclose(results[-1].top, found.top, rtol=1e-6, atol=1e-6 * np.abs(found.top).max())
+
+
+def test_the_top_goes_exactly_where_it_is_told():
+    pipe, _, start = started(scene("current"))
+    v, w = np.array([0.3, -0.2, 0.5]), np.array([0.02, -0.05, 0.03])
+    state = start
+    for _ in range(10):
+        state = pipe.step(state, v, w, 0.1).state
+    np.testing.assert_allclose(state.position[-1], np.array(TANGENT) + v, atol=1e-12)
+    turn = rotation(rotation_vector_quaternion(w)) @ rotation(np.array(TANGENT_ATTITUDE))
+    np.testing.assert_allclose(rotation(state.quaternion[-1]), turn, atol=1e-13)
+    assert state.time == pytest.approx(1.0)
+
+
+def test_a_step_that_cannot_converge_says_so_and_leaves_the_state_alone():
+    pipe, _, start = started(scene("current"))
+    kept = [np.array(part, copy=True) for part in start]
+    result = pipe.step(start, np.array([4000.0, 0.0, 0.0]), np.array([0.0, 300.0, 0.0]), 1.0)
+    assert not result.converged
+    assert result.state is start
+    assert not result.residual <= 1e-9
+    assert all(np.array_equal(a, b) for a, b in zip(kept, start, strict=True))
+    assert pipe.step(start, np.zeros(3), np.zeros(3), 0.1).converged
+
+
+def test_states_are_values_that_no_step_changes():
+    pipe, _, start = started(scene("everything"))
+    one = march(pipe, start, sway, 0.1, 3)[0][-1]
+    kept = [np.array(part, copy=True) for part in one]
+    first = pipe.step(one, np.array([0.3, 0.0, 0.1]), np.zeros(3), 0.1)
+    again = pipe.step(one, np.array([0.3, 0.0, 0.1]), np.zeros(3), 0.1)
+    assert all(np.array_equal(a, b) for a, b in zip(kept, one, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(first.state, again.state, strict=True))  # rollback repeats bit for bit
+
+
+def test_unit_reports_a_failed_step_in_one_line_and_keeps_its_state():
+    unit = PipeUnit(scene("current"))
+    still = {"velocity": np.zeros(3), "angular_velocity": np.zeros(3)}
+    assert unit.initialize(0.0, still) is None
+    before = unit.state
+    message = unit.step(0.0, 1.0, {"velocity": np.array([4000.0, 0.0, 0.0]), "angular_velocity": np.array([0.0, 300.0, 0.0])})
+    assert message is not None
+    assert "\n" not in message
+    assert "no convergence" in message
+    assert unit.state is before
+    assert unit.step(0.0, 0.1, still) is None

@@ -1,0 +1,213 @@
+"""The vessel's dynamic positioning: set-point, feed-forward, bumpless start, saturation, anti-windup, sampling grid."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import expm
+
+from vessel_fmu.dp_controller import control_law, due_sample, filtered, initial_control, pid, sampled, with_pull, wrap
+from vessel_fmu.environment import Current, Environment
+from vessel_fmu.parameters import Controller, Start, VesselParameters, mass_matrix
+from vessel_fmu.vessel import Inputs, Vessel
+
+HOLD = 379.6e3  # N, horizontal pull of the 16 in pipe hanging tangentially to the bed; 316.7e3 N at x = 780 m
+PAPER = VesselParameters(
+    controller=Controller(),
+    hold_force=(HOLD, 0.0, 0.0),
+    start=Start(position=(804.72, 0.0, -799.935)),
+    environment=Environment(current=Current(velocity=(0.0, 0.8, 0.0), start=10.0)),
+)
+
+
+def pipe_like(state, time):
+    """Horizontal pull between the two published values, stiff in sway, pushed and shaken by the current."""
+    x, y, _ = state.position
+    pull = 316.7e3 + (HOLD - 316.7e3) * (x - 780.0) / 24.72 * abs((x - 780.0) / 24.72) ** 0.5
+    wake = (25e3 + 5e3 * np.sin(0.6 * time)) if time > 10.0 else 0.0
+    shake = 1.0 + 0.03 * np.sin(0.7 * time) if time > 10.0 else 1.0
+    return Inputs(force=np.array([-pull * shake, wake - 3e3 * y, 9e5]))
+
+
+def simulate(vessel, duration, h, load=pipe_like):
+    """Times and states, the start included."""
+    state, history = vessel.start(), [(0.0, vessel.start())]
+    for k in range(round(duration / h)):
+        result = vessel.step(state, k * h, h, load(state, k * h))
+        assert result.converged
+        state = result.state
+        history.append(((k + 1) * h, state))
+    return history
+
+
+@pytest.mark.parametrize("h", [0.1, 1.0])
+def test_paper_scene_reaches_the_set_point(h):
+    """Paper 4.2: current at 10 s, controller at 30 s, and at 300 s within 1 m and 0.05 m/s of x = 780 m, y = 0."""
+    vessel = Vessel(PAPER)
+    history = simulate(vessel, 300.0, h)
+    _, state = history[-1]
+    assert np.hypot(state.position[0] - 780.0, state.position[1]) < 0.2
+    assert np.linalg.norm(state.body_velocity[:3]) < 0.02
+    assert max(abs(state.position[1]) for _, state in history) < 15.0
+    assert_allclose(state.control.reference[0], (780.0, 0.0, 0.0), atol=0.02)
+
+
+def test_hold_thrust_keeps_the_equilibrium_until_the_start():
+    calm = replace(PAPER, environment=Environment(), start=Start(position=(804.72, 0.0, -800.0)))
+    vessel = Vessel(replace(calm, controller=None))
+    state = simulate(vessel, 60.0, 0.5, lambda *_: Inputs(force=np.array([-HOLD, 0.0, 0.0])))[-1][1]
+    assert np.abs(state.position - [804.72, 0.0, 0.0]).max() < 1e-9
+    assert_allclose(vessel.thrust(state), (HOLD, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 2.0, -3.1])
+def test_controller_takes_over_without_a_bump(yaw):
+    """The first thrust of the controller is the hold thrust, though the vessel drifts and the pull has changed by then."""
+    hold = (-1e5, 2.5e5, -3e6)
+    vessel = Vessel(replace(PAPER, hold_force=hold, start=Start(attitude=(0.01, -0.02, yaw), velocity=(0.3, -0.2, 0.1))))
+    load = Inputs(force=np.array([-2e5, 1e5, 9e5]), moment=np.array([0.0, 0.0, 1e6]))
+    history = simulate(vessel, 30.5, 0.1, lambda *_: load)
+    thrusts = np.array([state.control.thrust for _, state in history])
+    samples = np.array([state.control.sample for _, state in history])
+    assert_allclose(thrusts[samples == -1], np.tile(hold, ((samples == -1).sum(), 1)), rtol=0)
+    assert_allclose(thrusts[samples == 0], np.tile(hold, ((samples == 0).sum(), 1)), rtol=1e-12)
+    assert (samples == 0).any()
+
+
+def test_feed_forward_carries_a_changed_pull():
+    """PD action alone would stand off by pull / K_p; with the pull fed forward nothing is left, also without integral action."""
+    vessel = Vessel(replace(PAPER, controller=Controller(start=0.0, x=804.72, integral_ratio=0.0), environment=Environment()))
+    state = simulate(vessel, 200.0, 0.5, lambda _, time: Inputs(force=np.array([-HOLD if time < 5.0 else -0.7 * HOLD, 0.0, 0.0])))[-1][1]
+    assert abs(state.position[0] - 804.72) < 1e-2
+    assert_allclose(vessel.thrust(state)[0], 0.7 * HOLD, rtol=1e-3)
+    assert 0.3 * HOLD / vessel.law.stiffness[0] > 1.0
+
+
+def test_feed_forward_carries_the_yaw_moment_of_the_hang_off_point():
+    """A pull across a point aft of the centre of gravity: its moment is fed forward, so that the heading comes back without integral."""
+    free = replace(
+        PAPER, controller=Controller(start=0.0, x=804.72, integral_ratio=0.0), hold_force=(0.0, 0.0, 0.0), environment=Environment()
+    )
+    vessel = Vessel(replace(free, hang_off=(-40.0, 0.0, 0.0)))
+    state = simulate(vessel, 300.0, 0.5, lambda *_: Inputs(force=np.array([0.0, 1e5, 0.0])))[-1][1]
+    assert_allclose(vessel.thrust(state), (0.0, -1e5, 4e6), atol=10.0)
+    assert abs(state.quaternion[3]) < 1e-4
+    assert_allclose(state.position[:2], (804.72, 0.0), atol=1e-2)
+
+
+def test_thrust_is_told_along_the_heading():
+    vessel = Vessel(replace(PAPER, hold_force=(2e5, 1e5, 3e6), start=Start(attitude=(0.0, 0.0, np.pi / 2))))
+    assert_allclose(vessel.thrust(vessel.start()), (1e5, -2e5, 3e6), rtol=1e-12)
+
+
+def test_feed_forward_acts_on_accepted_steps_only_and_not_within_the_step():
+    """Two trial steps from one state with different pulls have the same thrust: the mobility keeps no trace of the controller."""
+    vessel = Vessel(replace(PAPER, controller=Controller(start=0.0, period=0.1)))
+    state = simulate(vessel, 1.0, 0.1)[-1][1]
+    one, two = (vessel.step(state, 1.0, 0.1, Inputs(force=np.array([f, 0.0, 0.0]))).state.control for f in (-1e5, -9e5))
+    assert np.array_equal(one.thrust, two.thrust)
+    assert one.pull[0] > two.pull[0]
+
+
+def test_low_pass_of_the_pull_does_not_depend_on_the_step():
+    law, hold = control_law(PAPER), np.array([HOLD, 0.0, 0.0])
+    fine = coarse = initial_control(hold, np.zeros(3))
+    pull = np.array([-1e5, 2e5, 3e6])
+    for _ in range(100):
+        fine = with_pull(law, fine, pull, 0.1)
+    coarse = with_pull(law, coarse, pull, 10.0)
+    assert_allclose(fine.pull, coarse.pull, rtol=1e-12)
+    assert_allclose(coarse.pull - pull, np.exp(-1.0) * (-hold - pull), rtol=1e-12)
+
+
+@pytest.mark.parametrize("dt", [0.05, 3.0, 80.0])
+def test_reference_filter_is_the_exact_third_order_lag(dt):
+    """(1 + T d/dt)^3 eta = set-point, against the matrix exponential of its companion form."""
+    reference, set_point, lag = np.random.default_rng(2).normal(size=(3, 3)), np.array([1.0, -2.0, 0.3]), 20.0
+    companion = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(lag**-3), -3.0 * lag**-2, -3.0 / lag]])
+    offset = reference - np.array([set_point, np.zeros(3), np.zeros(3)])
+    expected = expm(dt * companion) @ offset + np.array([set_point, np.zeros(3), np.zeros(3)])
+    assert_allclose(filtered(reference, set_point, lag, dt), expected, rtol=1e-9, atol=1e-12)
+
+
+def test_thrust_is_saturated_along_the_heading():
+    parameters = replace(PAPER, hold_force=(0.0, 0.0, 0.0), start=Start(attitude=(0.0, 0.0, 0.7)))
+    law = control_law(parameters)
+    state = initial_control(np.zeros(3), np.array([804.72, 0.0, 0.7]))
+    far = np.array([[700.0, 300.0, -1.5], [0.0] * 3, [0.0] * 3])
+    _, thrust = pid(law, far, state.integral, state.pull, np.array([804.72, 0.0, 0.7]), np.zeros(3), 0.5)
+    c, s = np.cos(0.7), np.sin(0.7)
+    along = (c * thrust[0] + s * thrust[1], -s * thrust[0] + c * thrust[1], thrust[2])
+    wanted = law.stiffness * (c * -104.72 + s * 300.0, s * 104.72 + c * 300.0, -2.2)
+    assert_allclose(along, np.clip(wanted, -law.limit, law.limit), rtol=1e-12)
+    assert abs(along[1]) == pytest.approx(parameters.controller.sway_limit)
+    assert abs(along[2]) == pytest.approx(parameters.controller.yaw_limit)
+
+
+@pytest.mark.parametrize(("tracking", "overshoot"), [(None, 0.0), (1e12, 50.0)])
+def test_integral_does_not_wind_up_while_saturated(tracking, overshoot):
+    """After 200 s of load beyond the thrust the vessel comes back at once; without back-calculation it shoots 50 m past."""
+    weak = Controller(start=0.0, x=804.72, sway_limit=1e5, feed_forward_time=1e9)
+    vessel = Vessel(replace(PAPER, controller=weak, hold_force=(0.0, 0.0, 0.0), environment=Environment()))
+    if tracking is not None:
+        vessel.law = vessel.law._replace(tracking_time=tracking)
+
+    def blow(_, time):
+        return Inputs(environment_force=np.array([0.0, 1.5e5 if time < 200.0 else 0.0, 0.0]))
+
+    offset = np.array([state.position[1] for _, state in simulate(vessel, 500.0, 0.5, blow)])
+    assert offset.max() > 30.0
+    assert -offset.min() == pytest.approx(overshoot, abs=5.0)
+    assert (abs(offset[-1]) < 0.1) == (tracking is None)
+
+
+def test_heading_error_takes_the_short_way_round():
+    assert wrap(np.pi + 0.1) == pytest.approx(-np.pi + 0.1)
+    parameters = replace(PAPER, controller=Controller(start=0.0, yaw=-3.1, x=0.0), hold_force=(0.0, 0.0, 0.0), environment=Environment())
+    vessel = Vessel(replace(parameters, start=Start(position=(0.0, 0.0, -800.0), attitude=(0.0, 0.0, 3.1))))
+    history = simulate(vessel, 250.0, 0.5, lambda *_: Inputs())
+    headings = np.unwrap([2.0 * np.arctan2(state.quaternion[3], state.quaternion[0]) for _, state in history])
+    assert headings[-1] == pytest.approx(2.0 * np.pi - 3.1, abs=1e-3)
+    assert headings.min() > 3.1 - 1e-6
+
+
+@pytest.mark.parametrize("h", [0.07, 0.1, 0.3, 0.5, 1.3])
+def test_samples_follow_their_own_grid_whatever_the_macro_step(h):
+    """A sample is taken in the first step that begins at or after start + k period; none twice, none early, all if h < period."""
+    parameters = replace(PAPER, controller=Controller(start=2.0, period=0.5))
+    history = simulate(Vessel(parameters), 12.0, h)
+    begins = [time - h for time, _ in history[1:]]
+    taken = [state.control.sample for _, state in history[1:]]
+    for begin, sample in zip(begins, taken, strict=True):
+        assert sample == max(-1, int(np.floor((begin - 2.0) / 0.5 + 1e-6)))
+    changes = np.flatnonzero(np.diff([-1, *taken]))
+    assert_allclose([history[1 + i][1].control.time for i in changes], [begins[i] for i in changes])
+
+
+def test_thrust_between_samples_is_held():
+    vessel = Vessel(replace(PAPER, controller=Controller(start=0.0, period=1.0)))
+    history = simulate(vessel, 5.0, 0.1)
+    by_sample = {}
+    for _, state in history[1:]:
+        by_sample.setdefault(state.control.sample, []).append(state.control.thrust)
+    assert sorted(by_sample) == [0, 1, 2, 3, 4]
+    assert all(np.array_equal(thrust, thrusts[0]) for thrusts in by_sample.values() for thrust in thrusts)
+
+
+def test_gains_are_those_of_the_pole_placement():
+    """MSS PIDnonlinearMIMO: K_p = M w^2, K_d = 2 zeta w M; figures published for supply at w_n = 0.05, zeta = 1."""
+    law = control_law(replace(PAPER, controller=Controller(natural_frequency=0.05, integral_ratio=0.1)))
+    assert_allclose(law.stiffness, (1.80e4, 2.29e4, 9.74e6), rtol=3e-3)
+    assert_allclose(law.damping, (7.21e5, 9.18e5, 3.90e8), rtol=3e-3)
+    assert_allclose(law.integral, (90.0, 115.0, 4.87e4), rtol=5e-3)
+    assert_allclose(law.mass, np.diag(mass_matrix(PAPER))[[0, 1, 5]])
+
+
+def test_a_sample_is_not_due_before_the_start():
+    law, state = control_law(PAPER), initial_control(np.zeros(3), np.zeros(3))
+    assert due_sample(law, state, 29.9) is None
+    assert due_sample(law, state, 30.0 - 1e-9) == 0
+    after = sampled(law, state, 0, 30.0, np.zeros(3), np.zeros(3))
+    assert due_sample(law, after, 30.4) is None
+    assert due_sample(law, after, 31.7) == 3

@@ -1,0 +1,1 @@
+"""A rigid body of small motion, standing in for a vessel."""

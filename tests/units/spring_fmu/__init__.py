@@ -1,0 +1,1 @@
+"""A spring-damper end held by its top, standing in for a pipe."""

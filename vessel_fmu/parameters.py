@@ -1,0 +1,171 @@
+"""Parameters of the vessel; the defaults are the supply vessel of the Marine Systems Simulator (MSS), about its centre of gravity.
+
+Source of the numbers: MSS (MIT licence, T. I. Fossen and T. Perez), ShipX data of a supply vessel of 82.8 x 19.2 x 6 m
+moved from its origin (midships, waterline) to the centre of gravity, which lies 5.39 m aft and 1.30 m above. Added mass
+is A(0) in surge, sway and yaw and A at the natural frequency in heave, roll and pitch (A(infinity) belongs to the fluid
+memory, which is not modelled). Of the couplings only sway-yaw A_26(0) is kept: heave-pitch A_35 stems, like C_35, from
+the offset of the flotation centre, which the restoring (54), (58) leaves out, and A_15, A_24, A_46 mix modes whose
+added masses are taken at different frequencies. Linear damping is M_ii / T with T = 88, 45 and 12 s in surge, sway and
+yaw (model of Fossen, Sagatun and Sorensen 1996) and B at the natural frequency in heave, roll and pitch, roll with
+3.0e7 N m s viscous damping. Drag coefficients, thrust limits and times of the controller are engineering choices.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .checks import check_fields, number
+from .environment import Environment
+
+Vector3 = tuple[float, float, float]
+MODES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+COUPLINGS = ("surge_heave", "surge_pitch", "heave_pitch", "sway_roll", "sway_yaw", "roll_yaw")
+
+
+@dataclass(frozen=True)
+class AddedMass:
+    """Entries of the symmetric added-mass matrix of a hull with port-starboard symmetry, about the centre of gravity."""
+
+    surge: float = number(8.463e5, "kg", "A_11", min=0.0)
+    sway: float = number(2.8169e6, "kg", "A_22", min=0.0)
+    heave: float = number(7.898e6, "kg", "A_33", min=0.0)
+    roll: float = number(8.8812e7, "kg.m2", "A_44", min=0.0)
+    pitch: float = number(3.3572e9, "kg.m2", "A_55", min=0.0)
+    yaw: float = number(1.1701e9, "kg.m2", "A_66", min=0.0)
+    surge_heave: float = number(0.0, "kg", "A_13 = A_31")
+    surge_pitch: float = number(0.0, "kg.m", "A_15 = A_51")
+    heave_pitch: float = number(0.0, "kg.m", "A_35 = A_53")
+    sway_roll: float = number(0.0, "kg.m", "A_24 = A_42")
+    sway_yaw: float = number(8.8463e6, "kg.m", "A_26 = A_62")
+    roll_yaw: float = number(0.0, "kg.m2", "A_46 = A_64")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class LinearDamping:
+    """Entries of the symmetric matrix of linear (potential and viscous) damping, about the centre of gravity."""
+
+    surge: float = number(8.191e4, "N.s/m", "D_11", min=0.0)
+    sway: float = number(2.040e5, "N.s/m", "D_22", min=0.0)
+    heave: float = number(5.8222e6, "N.s/m", "D_33", min=0.0)
+    roll: float = number(3.4467e7, "N.m.s", "D_44, viscous roll damping included", min=0.0)
+    pitch: float = number(3.3615e9, "N.m.s", "D_55", min=0.0)
+    yaw: float = number(3.247e8, "N.m.s", "D_66", min=0.0)
+    surge_heave: float = number(0.0, "N.s/m", "D_13 = D_31")
+    surge_pitch: float = number(0.0, "N.s", "D_15 = D_51")
+    heave_pitch: float = number(0.0, "N.s", "D_35 = D_53")
+    sway_roll: float = number(0.0, "N.s", "D_24 = D_42")
+    sway_yaw: float = number(0.0, "N.s", "D_26 = D_62")
+    roll_yaw: float = number(0.0, "N.m.s", "D_46 = D_64")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if np.linalg.eigvalsh(symmetric_matrix(self))[0] < -1e-12 * max(getattr(self, mode) for mode in MODES):
+            raise ValueError(f"sway_yaw = {self.sway_yaw:g} and the other couplings: must leave the damping positive semidefinite")
+
+
+@dataclass(frozen=True)
+class HullDrag:
+    """Quadratic drag: surge resistance, and cross-flow on strips along the hull, which damps sway and yaw together."""
+
+    length: float = number(82.8, "m", "length over which cross-flow acts", above=0.0)
+    beam: float = number(19.2, "m", "beam, for the frontal area", above=0.0)
+    draft: float = number(6.0, "m", "draft", above=0.0)
+    midship: float = number(5.386, "m", "x of midships from the centre of gravity, positive forward")
+    surge_coefficient: float = number(0.2, "1", "drag coefficient on beam x draft", min=0.0)
+    cross_flow_coefficient: float = number(0.8, "1", "drag coefficient on length x draft", min=0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Dynamic positioning: PID in surge, sway and yaw by pole placement, reference filter, feed-forward of the pipe's pull."""
+
+    x: float = number(780.0, "m", "set-point x, in e")
+    y: float = number(0.0, "m", "set-point y, in e")
+    yaw: float = number(0.0, "rad", "set-point heading")
+    start: float = number(30.0, "s", "time at which the controller takes over from the hold thrust")
+    period: float = number(0.5, "s", "sampling period", above=0.0)
+    natural_frequency: float = number(0.1, "rad/s", "w_n of the closed loop, K_p = M w_n^2", above=0.0)
+    damping_ratio: float = number(1.0, "1", "zeta of the closed loop, K_d = 2 zeta w_n M", above=0.0)
+    integral_ratio: float = number(0.2, "1", "K_i = ratio w_n K_p", min=0.0)
+    filter_time: float = number(20.0, "s", "time constant of the third-order reference filter", above=0.0)
+    feed_forward_time: float = number(10.0, "s", "time constant of the low-pass on the pull that is fed forward", above=0.0)
+    surge_limit: float = number(1.0e6, "N", "largest thrust in surge", above=0.0)
+    sway_limit: float = number(0.6e6, "N", "largest thrust in sway", above=0.0)
+    yaw_limit: float = number(2.0e7, "N.m", "largest thruster moment in yaw", above=0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        routh = 2.0 * self.damping_ratio
+        if self.integral_ratio >= routh:
+            raise ValueError(f"integral_ratio = {self.integral_ratio:g}: must be < 2 damping_ratio = {routh:g}, or the loop is unstable")
+
+
+@dataclass(frozen=True)
+class Start:
+    """Pose and velocity at the start."""
+
+    position: Vector3 = number((804.72, 0.0, -800.0), "m", "centre of gravity, in e")
+    attitude: Vector3 = number((0.0, 0.0, 0.0), "rad", "roll, pitch, yaw (zyx)")
+    velocity: Vector3 = number((0.0, 0.0, 0.0), "m/s", "surge, sway, heave velocity, in b")
+    angular_velocity: Vector3 = number((0.0, 0.0, 0.0), "rad/s", "roll, pitch, yaw rate, in b")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class VesselParameters:
+    """The whole vessel; None for `damping`, `drag` or `controller` leaves that part out."""
+
+    mass: float = number(6.3622e6, "kg", "mass m_V", above=0.0)
+    inertia: Vector3 = number((2.87307e8, 2.726143e9, 2.726143e9), "kg.m2", "roll, pitch, yaw inertia about the CG", above=0.0)
+    waterplane_area: float = number(1383.39, "m2", "A_wp", above=0.0)
+    metacentric_height: float = number(2.144, "m", "transverse GM_T", above=0.0)
+    longitudinal_metacentric_height: float = number(103.628, "m", "longitudinal GM_L", above=0.0)
+    hang_off: Vector3 = number((0.0, 0.0, 0.0), "m", "hang-off point r_t from the CG, in b")
+    departure_angle: float = number(1.1760, "rad", "alpha of R_b^t = R_y(-alpha): pitch of the held pipe over the bow direction")
+    departure_rotation: Vector3 = number((0.0, 0.0, 0.0), "rad", "rotation vector in b applied to the held section after alpha")
+    hold_force: Vector3 = number((0.0, 0.0, 0.0), "N", "constant thrust until the controller starts: x, y in e, yaw moment in N.m")
+    added_mass: AddedMass = field(default_factory=AddedMass)
+    damping: LinearDamping | None = field(default_factory=LinearDamping)
+    drag: HullDrag | None = field(default_factory=HullDrag)
+    controller: Controller | None = None
+    start: Start = field(default_factory=Start)
+    environment: Environment = field(default_factory=Environment)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if np.linalg.eigvalsh(mass_matrix(self))[0] <= 0.0:
+            raise ValueError(f"added_mass = {self.added_mass}: must leave the 6 x 6 mass matrix positive definite")
+        if self.controller is not None:
+            self._check_hold(self.controller)
+
+    def _check_hold(self, controller: Controller) -> None:
+        yaw, (x, y, moment) = self.start.attitude[2], self.hold_force
+        surge, sway = math.cos(yaw) * x + math.sin(yaw) * y, math.cos(yaw) * y - math.sin(yaw) * x
+        for mode, value, unit in (("surge", surge, "N"), ("sway", sway, "N"), ("yaw", moment, "N.m")):
+            limit = getattr(controller, f"{mode}_limit")
+            if abs(value) > limit:
+                rule = f"must be >= the hold thrust {abs(value):.6g} {unit}"
+                raise ValueError(f"controller.{mode}_limit = {limit:g}: {rule}")
+
+
+def symmetric_matrix(entries: AddedMass | LinearDamping) -> np.ndarray:
+    """6 x 6 matrix of the named entries."""
+    matrix = np.diag([getattr(entries, mode) for mode in MODES])
+    for coupling in COUPLINGS:
+        i, j = (MODES.index(mode) for mode in coupling.split("_"))
+        matrix[i, j] = matrix[j, i] = getattr(entries, coupling)
+    return matrix
+
+
+def mass_matrix(parameters: VesselParameters) -> np.ndarray:
+    """M = M_RB + M_A, eq. (37), 6 x 6 about the centre of gravity, in b."""
+    return np.diag([parameters.mass] * 3 + list(parameters.inertia)) + symmetric_matrix(parameters.added_mass)

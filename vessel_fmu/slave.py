@@ -1,0 +1,114 @@
+"""The vessel as a co-simulation unit: ports by name, snapshots as references. Knows nothing of FMI."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .attitude import Array, angles_from_quaternion
+from .parameters import VesselParameters
+from .vessel import WORKS, Inputs, State, Vessel
+
+Port = tuple[int, str, str]  # size, unit ("" for mixed units), description
+
+
+class VesselUnit:
+    """Six-degree-of-freedom vessel with hang-off point; `state` is an immutable value, so that saving it costs nothing."""
+
+    NAME = "vessel"
+    DESCRIPTION = "Surface vessel in six degrees of freedom, discretely passive, with optional dynamic positioning"
+    PARAMETERS = VesselParameters
+    INPUTS: ClassVar[dict[str, Port]] = {
+        "force": (3, "N", "force of the pipe on the vessel at the hang-off point, in e, held over the step"),
+        "moment": (3, "N.m", "moment of the pipe on the vessel at the hang-off point, in e, held over the step"),
+        "control_force": (3, "", "external controller: surge and sway force in b, N, and yaw moment, N.m"),
+        "environment_force": (3, "N", "environmental force at the centre of gravity, in e"),
+        "environment_moment": (3, "N.m", "environmental moment, in e"),
+    }
+
+    def __init__(self, parameters: VesselParameters) -> None:
+        self.vessel = Vessel(parameters)
+        self._state = self.vessel.start()
+        self._memo: dict[str, Array] = {}
+
+    @staticmethod
+    def outputs(parameters: VesselParameters) -> dict[str, Port]:
+        """Output ports: name -> (size, unit, description)."""
+        without = parameters.controller is None and any(parameters.hold_force[:2])
+        hold = {"hold_energy": (1, "J", "potential of the constant hold thrust where no controller ever takes over")} if without else {}
+        return hold | {
+            "velocity": (3, "m/s", "mean velocity of the hang-off point over the last step, in e"),
+            "angular_velocity": (3, "rad/s", "rotation vector of the last step over its length, in e"),
+            "mobility": (36, "", "row-major response of (velocity, angular_velocity) to (force, moment), last step"),
+            "hang_off_position": (3, "m", "hang-off point, in e"),
+            "hang_off_quaternion": (4, "1", "orientation of the pipe section held there, t to e, scalar first"),
+            "position": (3, "m", "centre of gravity, in e"),
+            "quaternion": (4, "1", "attitude, b to e, scalar first"),
+            "roll": (1, "rad", "roll angle (zyx)"),
+            "pitch": (1, "rad", "pitch angle (zyx)"),
+            "yaw": (1, "rad", "yaw angle (zyx)"),
+            "body_velocity": (6, "", "linear, m/s, and angular velocity, rad/s, of the centre of gravity in b"),
+            "set_point": (3, "", "set-point after the reference filter: x, y, m; yaw, rad"),
+            "thrust": (3, "", "own thrust along the heading, hold included: surge, sway, N; yaw, N.m"),
+            "kinetic_energy": (1, "J", "kinetic energy of hull and added mass"),
+            "restoring_energy": (1, "J", "potential of the hydrostatic restoring"),
+            "bond_work": (1, "J", "work done on the vessel at the hang-off point since the start"),
+            "control_work": (1, "J", "work of the hold thrust, the own and the external controller since the start"),
+            "environment_work": (1, "J", "work of the environmental force and moment since the start"),
+            "current_work": (1, "J", "work supplied by the current since the start"),
+            "damping_dissipation": (1, "J", "energy taken by the linear damping since the start"),
+            "drag_dissipation": (1, "J", "energy taken by the quadratic drag since the start"),
+        }
+
+    def initialize(self, time: float, inputs: dict[str, Array]) -> str | None:
+        """Take the pose, velocity and hold thrust of the parameters; never fails."""
+        self.state = self.vessel.start()
+        return None
+
+    def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
+        """Step from `time`, s, by h, s; a message and the state unchanged if Newton did not converge."""
+        result = self.vessel.step(self._state, time, h, Inputs(**inputs))
+        if not result.converged:
+            return f"vessel: Newton stopped at a relative unbalance of {result.residual:.1e} after {result.iterations} iterations"
+        self.state = result.state
+        return None
+
+    @property
+    def state(self) -> State:
+        """The state; setting it restores everything exactly."""
+        return self._state
+
+    @state.setter
+    def state(self, value: Any) -> None:
+        self._state = value
+        self._memo = {}
+
+    def output(self, name: str) -> Array:
+        """Value (size,) of an output port in the present state. Raises KeyError for an unknown name."""
+        if name not in self._memo:
+            self._memo.update(self._evaluate(name))
+        return self._memo[name]
+
+    def _evaluate(self, name: str) -> dict[str, Array]:
+        state, vessel = self._state, self.vessel
+        if name in WORKS:
+            works = {work: state.works[i : i + 1] for i, work in enumerate(WORKS)}
+            return works | {"control_work": works["control_work"] + vessel.hold_energy(state)}  # less what the hold's potential holds
+        if name in ("velocity", "angular_velocity"):
+            return {"velocity": state.mean_velocity[:3], "angular_velocity": state.mean_velocity[3:]}
+        if name in ("hang_off_position", "hang_off_quaternion"):
+            point, quaternion = vessel.hang_off_pose(vessel.position(state), state.quaternion)
+            return {"hang_off_position": point, "hang_off_quaternion": quaternion}
+        if name in ("roll", "pitch", "yaw"):
+            return {n: np.array([v]) for n, v in zip(("roll", "pitch", "yaw"), angles_from_quaternion(state.quaternion), strict=True)}
+        values = {
+            "mobility": lambda: state.mobility.ravel(),
+            "position": lambda: vessel.position(state),
+            "quaternion": lambda: state.quaternion,
+            "body_velocity": lambda: state.body_velocity,
+            "set_point": lambda: state.control.reference[0],
+            "thrust": lambda: vessel.thrust(state),
+            "kinetic_energy": lambda: np.array([vessel.kinetic_energy(state)]),
+            "hold_energy": lambda: np.array([vessel.hold_energy(state)]),
+            "restoring_energy": lambda: np.array([vessel.restoring_energy(state)]),
+        }
+        return {name: values[name]()}
