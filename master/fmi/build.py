@@ -28,10 +28,12 @@ from xml.etree import ElementTree
 
 from pythonfmu import FmuBuilder
 
+from . import loader
 from .document import icon_png, port_table_html
 
 HERE = Path(__file__).parent
-BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py")
+BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py", "server.py")
+LINUX = "binaries/linux64/"
 CAPABILITIES = {"needsExecutionTool": False, "canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date a zip archive can hold: equal contents, equal bytes
 
@@ -89,7 +91,7 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
             target.write_bytes(text)
         raw = FmuBuilder.build_FMU(entry, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **CAPABILITIES)
         finished = destination.with_name(f".{os.getpid()}_{destination.name}")
-        _finish(Path(raw), finished)
+        _finish(Path(raw), finished, _loaders())
         finished.replace(destination)
     return destination
 
@@ -138,20 +140,33 @@ def _sources(recipe: Recipe) -> dict[str, bytes]:
 
 def _digest(parts: Mapping[str, str | bytes]) -> str:
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
-    digest.update((HERE / "entry.py").read_bytes())
+    for source in ("entry.py", "runtime.py", "loader.c"):
+        digest.update((HERE / source).read_bytes())
+    digest.update(sys.executable.encode())
     for name, content in sorted(parts.items()):
         data = content.encode() if isinstance(content, str) else content
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
     return digest.hexdigest()[:12]
 
 
-def _finish(raw: Path, finished: Path) -> None:
-    """Repack compressed, in fixed order and with fixed dates; add documentation and icon."""
+def _loaders() -> Path:
+    """Where compiled loaders are kept."""
+    chosen = os.environ.get("PIPELAY_CACHE")
+    place = Path(chosen) if chosen else Path.home() / ".cache" / "pipelay"
+    return (place if os.access(place.parent, os.W_OK) else Path(tempfile.gettempdir(), "pipelay")) / "loaders"
+
+
+def _finish(raw: Path, finished: Path, loaders: Path) -> None:
+    """Repack compressed, in fixed order and with fixed dates; add documentation, icon and loader."""
     with zipfile.ZipFile(raw) as source, zipfile.ZipFile(finished, "w", zipfile.ZIP_DEFLATED) as target:
         contents = {name: source.read(name) for name in source.namelist()}
         model = ElementTree.fromstring(contents["modelDescription.xml"])
         contents["documentation/index.html"] = port_table_html(model).encode()
         contents["model.png"] = icon_png()
+        for name in (name for name in contents if name.startswith(LINUX)):  # Windows keeps PythonFMU's
+            contents[name] = loader.library(loaders)
+        contents["resources/runtime.py"] = (HERE / "runtime.py").read_bytes()
+        contents["resources/python.txt"] = sys.executable.encode()
         for name in sorted(contents):
             target.writestr(zipfile.ZipInfo(name, _EPOCH), contents[name], zipfile.ZIP_DEFLATED)
 

@@ -22,6 +22,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+released_by_host = True  # PythonFMU does; the loader and `server` do not
 LONGEST = 1000  # characters; hosts format messages in buffers of fixed size
 
 
@@ -48,7 +49,7 @@ def where(error: BaseException) -> str:
 
 def refusal(slave: Any, message: str) -> Refused:
     """The exception to raise out of a method of `slave` that PythonFMU calls."""
-    for released in (type(slave), slave, slave.log_queue):
+    for released in (type(slave), slave, slave.log_queue) if released_by_host else ():
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(released))
     return Refused(message)
 

@@ -1,0 +1,42 @@
+"""Compiles the loader, an FMU's binary (loader.c), once for a machine and version."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+SOURCE = Path(__file__).with_name("loader.c")
+FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-shared", "-s")
+
+
+def compiler() -> list[str]:
+    """ziglang's compiler (for glibc 2.17, so for every Linux in use), else the machine's own. Raises ValueError without either."""
+    if importlib.util.find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-linux-gnu.2.17"]
+    if found := shutil.which("cc"):
+        return [found]
+    raise ValueError("no C compiler for the FMU's loader: pip install ziglang")
+
+
+def library(folder: Path) -> bytes:
+    """The loader for Linux x86-64, kept in `folder`. Raises ValueError with the compiler's words where it fails."""
+    command = [*compiler(), *FLAGS]
+    place = folder / f"loader_{hashlib.sha256(SOURCE.read_bytes() + repr(command).encode()).hexdigest()[:12]}.so"
+    if not place.is_file():
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder) as work:
+            made = Path(work, "loader.so")
+            caches = {"ZIG_GLOBAL_CACHE_DIR": work, "ZIG_LOCAL_CACHE_DIR": work}
+            done = subprocess.run(
+                [*command, "-o", str(made), str(SOURCE), "-ldl", "-lpthread"], env=os.environ | caches, capture_output=True, text=True
+            )
+            if done.returncode:
+                raise ValueError(f"the FMU's loader does not compile: {' '.join(done.stderr.split())[:1000]}")
+            made.replace(place)
+    return place.read_bytes()
