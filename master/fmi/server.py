@@ -71,7 +71,8 @@ class Server:
 
     def _call(self, function: int, instance: int, slot: _Slot | None, data: memoryview) -> bytes | None:
         if function == 0:
-            return self._instantiate(instance, data)
+            self._instantiate(instance, data)
+            return None
         if slot is None:
             raise Refused(f"instance {instance}: there is none")
         if function == 1:
