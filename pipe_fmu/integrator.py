@@ -59,9 +59,9 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     top = h * np.concatenate([velocity, spin])
     old = state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain
     spent = 0
-    for guess in (2.0 * state.last - state.before, state.last, np.zeros_like(state.last)):
+    for guess, careful in ((2.0 * state.last - state.before, False), (state.last, True), (np.zeros_like(state.last), True)):
         converged, x, strain, force, tangent, works, iterations, residual = solve_step(
-            line, water, h, *old, h * guess, top, MAX_CORRECTIONS
+            line, water, h, *old, h * guess, top, careful, 4 * MAX_CORRECTIONS if careful else MAX_CORRECTIONS
         )
         spent += iterations
         if converged:

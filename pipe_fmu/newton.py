@@ -13,6 +13,8 @@ TOLERANCE = 1e-11  # of the largest element force (moment): well below any coupl
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
 NEAR = 1e-5  # residual from which on a tangent is kept
 SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
+SHARP = 1e-3  # residual below which a careful search takes Newton's tangent of friction
+LEAST_SHARE = 0.02  # of a correction that a careful search takes, before it takes what it gets
 LOST = 1e12  # residual from which there is no way back
 
 
@@ -130,7 +132,7 @@ def _size(residual, force_scale, moment_scale, top_clamped):
 
 
 @kernel
-def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, limit):
+def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, careful, limit):
     """Increments (n, 6) of one step with the top's increment `top` (6,) prescribed, from `guess` (n, 6), in at most `limit` corrections.
 
     The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
@@ -147,11 +149,11 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
     works = np.empty(6)
     tangent = np.zeros((6, 6))
     force, wanted, move = np.empty(6), np.empty(6), np.empty(6)
-    previous, size = math.inf, math.inf
+    previous, size, share, best = math.inf, math.inf, 1.0, math.inf
     fresh, keep = True, True
     for iteration in range(limit + 1):
         force_scale, moment_scale = step_system(
-            line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, system, works
+            line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, not careful or size < SHARP, system, works
         )
         gap = 0.0
         for i in range(SIZE):
@@ -164,6 +166,13 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
         done = gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous))
         if done and iteration > 0:
             return True, x, new_strain, force, tangent, works, iteration, size
+        if careful and iteration > 1 and not size * force_scale < best and share > LEAST_SHARE:
+            share *= 0.5
+            for k in range(n):
+                for i in range(SIZE):
+                    x[k, i] -= share * correction[k, i]
+            continue
+        best, share = size * force_scale, 1.0
         if not size < LOST or iteration == limit:
             break
         if fresh:
@@ -176,7 +185,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             continue
         if done:
             return True, x, new_strain, force, tangent, works, iteration, size
-        fresh = not keep
+        fresh = careful or not keep
         condense(diagonal, lower, pivots, residual)
         if not top_correction(line, diagonal[n - 1], residual[n - 1], wanted, move):
             break

@@ -189,7 +189,7 @@ def step_system(line, old, x, h, water=STILL, flow=None):
     strain, new_strain, works = np.empty((n - 1, 7)), np.empty((n - 1, 7)), np.empty(6)
     step_kernel.element_strains(line, position, quaternion, strain)
     flow = np.zeros((len(line.added_mass), 3)) if flow is None else flow
-    step_kernel.step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, True, system, works)
+    step_kernel.step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, True, True, system, works)
     return system[3].ravel(), assembled(*system[:3]), new_strain, works
 
 
