@@ -242,7 +242,7 @@ def centres(line, position, quaternion):
 def free_step(line, old, h, water=STILL, limit=60, load=0.0, held=()):
     """Step of a line whose ends are both free: Newton's method on dense matrices, to round-off.
 
-    line: one, or a list of lines joined end to end. load (6 n,): dead nodal forces and moments, means over the step; held: unknowns at rest.
+    line: one, or a list of lines joined end to end. load (6 n,): dead nodal loads, means over the step; held: unknowns at rest.
     """
     lines = members(line)
     node = node_numbers(lines)

@@ -81,7 +81,7 @@ BEND_FIGURES = {  # tip across, along and out of the plane
 
 
 def bend(sides, load):
-    """Tip of the 45-degree bend of radius 100 as a polygon of straight lines on the arc, joined rigidly: across, along, out of the plane."""
+    """Tip of the 45-degree bend of radius 100 as a polygon of straight lines joined rigidly: across, along, out of the plane."""
     angle = math.pi / 4 / sides
     s, side = bar(200.0 * math.sin(0.5 * angle), 3, **BEND)
     headings = angle * (np.arange(sides) + 0.5)
@@ -194,9 +194,9 @@ PRINCETON_FIGURES = {  # tip load [N], its angle to the stiff direction [degrees
 def test_princeton_beam_experiment(force, angle):
     """Dowell and Traybar (1975): aluminium strip, tip weights of 8.896 and 13.345 N at 0 to 90 degrees to its stiff direction.
 
-    Published tip displacements: beam elements of Ansys by Obrezkov et al. (Nonlinear Dynamics 109, 2022), as quoted in Exudyn's test models,
-    for 508 x 12.3777 x 3.2024 mm, E = 71.7 GPa, nu = 0.31; shear and torsion factors not given, here 5/6 and Roark's: within 1.5 % chordwise,
-    0.25 % flapwise. Against shooting, the tip's twist included: 4e-5 m and 2e-4 rad with 10 elements.
+    Published tip displacements: Ansys beam elements by Obrezkov et al. (Nonlinear Dynamics 109, 2022), as quoted in Exudyn's test models,
+    for 508 x 12.3777 x 3.2024 mm, E = 71.7 GPa, nu = 0.31; shear and torsion factors not given, here 5/6 and Roark's: within 1.5 %
+    chordwise, 0.25 % flapwise. Against shooting, the tip's twist included: 4e-5 m and 2e-4 rad with 10 elements.
     """
     s, line = bar(0.508, 11, **PRINCETON)
     radians = math.radians(angle)
