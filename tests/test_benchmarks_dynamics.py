@@ -61,7 +61,7 @@ def spaghetti(h, end, load, mean, bending, nodes=11):
 def test_simo_and_vu_quoc_flying_spaghetti_in_space():
     """Simo and Vu-Quoc (1988): EA = GA = 1e4, EI = GJ = 500, rho A = 1, J = (20, 10, 10); T rises to 200 at 2.5 s and is gone at 5 s.
 
-    Force T / 10 along e1, moments -T / 2 about e2 and -T about e3. Analytic: momentum 50 and from 5 s on the centre at (3 + 5 (t - 2.5), 4, 0).
+    Force T / 10 along e1, moments -T / 2 about e2 and -T about e3. Analytic: momentum 50, from 5 s on the centre at (3 + 5 (t - 2.5), 4).
     After that energy stands to 1e-12 and linear momentum to 1e-12; the angular momentum (0, -308.5, -532.1) wavers by 1.2e-4 of itself at
     0.1 s, 2.9e-5 at 0.05 s: second order.
     """
