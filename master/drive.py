@@ -11,9 +11,10 @@ from typing import Protocol
 
 import numpy as np
 
-from master.bond import hang_off, impedance_end, mobility_end
+from master.bond import end_value_ends, impedance_end, mobility_end
 from master.coupling import SMALLEST_STEP, Step, coupling
 from master.fmu import Fmu, Names, StepRejected
+from master.hang_off import hang_off
 from master.ledger import Columns, Ledger
 from master.prepared import Prepared
 from master.recorder import Source
@@ -64,7 +65,10 @@ class Coupled:
         self.time = 0.0
         self.units: Mapping[str, Fmu] = {"pipe": pipe, "vessel": vessel}
         self._clamped = sections.pipe.get("top") != "pinned"
-        self._pipe, self._vessel = impedance_end(pipe, bond), mobility_end(vessel, bond)
+        if rules.scheme == "energy-consistent":
+            self._pipe, self._vessel = impedance_end(pipe, bond, rollback=rules.rollback), mobility_end(vessel, bond)
+        else:
+            self._pipe, self._vessel = end_value_ends(pipe, vessel, bond)
         sources = [(pipe, columns(pipe, "top_work")), (vessel, columns(vessel, "bond_work"))]
         self.ledger = Ledger(sources, rules.energy_check, rules.on_violation)
         self._macro_step = sections.simulation.macro_step
