@@ -195,14 +195,16 @@ def test_extrapolation_of_a_parabola_over_uneven_steps_is_exact():
 @pytest.mark.parametrize("step", [0.1, 1.0, 10.0])
 @pytest.mark.parametrize("mass", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("spring", [{}, {"stiffness": 1e-3, "damping": 1.0}, {"inertia": 1.0}, {"inertia": 1.0, "damping": 0.3}])
-def test_one_solve_each_without_rollback_stays_bounded_at_any_mass_ratio(files, spring, mass, step):
+def test_one_solve_each_without_rollback_does_not_grow_at_any_mass_ratio(files, spring, mass, step):
     body = {"mass": mass, "inertia": mass, "damping": 0.05, "stiffness": 0.1, "load": [0.3, 0.0, 0.0], **PUSH}
-    with tied(files, spring, body, step, rollback=False, action="warn") as pair, tied(files, spring, body, step) as exact:
-        supplied = energy(pair)
-        pair.run(step, 300 * step)
-        exact.run(step, 300 * step)
+    with tied(files, spring, body, step, rollback=False, action="warn") as pair:
+        energies = []
+        for i in range(300):
+            pair.run_one(i * step, step)
+            energies.append(energy(pair))
         assert pair.coupling.impedance.solves == pair.coupling.mobility.solves == 300
-        assert energy(pair) < 10.0 * (supplied + energy(exact) + 1.0)
+        assert max(energies[150:]) < 1.5 * max(energies[:150])
+        assert max(energies) < 1e3
         np.testing.assert_allclose(pair.spring.get("stretch"), pair.body.get("position"), rtol=1e-9, atol=1e-9)
 
 
@@ -288,9 +290,10 @@ def test_directional_derivatives_serve_where_there_is_no_port(files):
         np.testing.assert_allclose(pair.state, port.state, rtol=1e-9)
 
 
-def test_a_reversed_effort_and_ports_of_other_names_do_not_change_the_bond(files):
+def test_a_reversed_effort_port_is_turned_round(files):
     bond = Bond(tuple(replace(pair, reverse=True) for pair in hang_off().pairs))
-    with tied(files, {"gain": -1.0, "hardening": 1.0}, PUSH, 0.1, checked=False) as pair, tied(files, {"hardening": 1.0}, PUSH, 0.1) as good:
+    wrong, right = {"gain": -1.0, "hardening": 1.0}, {"hardening": 1.0}
+    with tied(files, wrong, PUSH, 0.1, checked=False) as pair, tied(files, right, PUSH, 0.1) as good:
         ends = impedance_end(pair.spring, bond), mobility_end(pair.body, bond)
         pair.coupling = coupling("energy-consistent", *ends, bond, 0.1)
         pair.run(0.1, 3.0)
