@@ -41,6 +41,8 @@ class EnergyConsistent:
     `check` sees a step before it is committed (the ends' outputs are those of its end) and may send it back.
     """
 
+    words = "energy-consistent, iterated with rollback"
+
     def __init__(
         self, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
     ) -> None:

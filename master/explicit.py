@@ -17,6 +17,7 @@ class Explicit:
     def __init__(self, impedance: End, mobility: End, bond: Bond, macro_step: float, serial: bool, check: Check = accept) -> None:
         self.impedance, self.mobility, self.bond = impedance, mobility, bond
         self.macro_step, self.serial, self.check = macro_step, serial, check
+        self.words = f"{'serial' if serial else 'parallel'} exchange of values at the end of the step, not iterated"
         self.counters = Counters()
         self._flow, self._effort = mobility.result(), impedance.result()
 

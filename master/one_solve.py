@@ -60,6 +60,8 @@ class OneSolve:
     to what it is given (slope zero), which is stable only where that end answers weakly.
     """
 
+    words = "energy-consistent, not iterated: without rollback each unit is solved once a step and a residual is left"
+
     def __init__(self, impedance: End, mobility: End, bond: Bond, macro_step: float, check: Check = accept) -> None:
         self.impedance, self.mobility, self.bond = impedance, mobility, bond
         self.macro_step, self.check = macro_step, check

@@ -115,7 +115,6 @@ class General:
 
 def general(mapping: Mapping[str, Any], folder: Path) -> General:
     """The checked tables; FMU files are sought in `folder`. Raises ValueError (key = value: rule)."""
-    plain = {**mapping, "folder": folder, "units": {}, "settings": {}, "connections": ()}
     units = mapping["units"]
     if not isinstance(units, Mapping):
         raise ValueError(f"units = {units!r}: must be a table")
@@ -132,7 +131,7 @@ def general(mapping: Mapping[str, Any], folder: Path) -> General:
     rows = mapping.get("connections", [])
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) and set(row) == {"from", "to"} for row in rows):
         raise ValueError(f"connections = {rows!r}: must be a list of tables with from and to, each unit.port")
-    known = {key: plain[key] for key in plain if key not in ("units", "settings", "connections", "folder", "simulation", "bond", "coupling")}
+    known = {key: value for key, value in mapping.items() if key not in ("units", "connections", "simulation", "bond", "coupling")}
     for key in known:
         if key not in ("title", "description"):
             allowed = "simulation, units, bond, connections, coupling, title, description"
@@ -183,7 +182,8 @@ class Wiring:
         for port in ports[1:]:
             if port.size != ports[0].size:
                 raise UsageError(f"{where}: {ports[0].name} has {ports[0].size} values and {port.name} {port.size}; must be equal")
-        return Pair(row.effort, row.flow, row.floor, ports[0].size, row.effort_input, row.flow_input, row.end_effort, row.end_flow, row.reverse)
+        names = (row.effort_input, row.flow_input, row.end_effort, row.end_flow)
+        return Pair(row.effort, row.flow, row.floor, ports[0].size, *names, row.reverse)
 
     def connections(self) -> list[tuple[Fmu, str, Fmu, str]]:
         """Source and target of the further connections."""
@@ -206,9 +206,10 @@ class Wiring:
         fmu = self.fmus[unit]
         port = fmu.ports.get(name)
         if port is None:
-            raise UsageError(f"{where} = {name!r}: unit {unit} has no such {causality}; there are {', '.join(fmu.names(causality)) or 'none'}")
+            there = ", ".join(fmu.names(causality)) or "none"
+            raise UsageError(f"{where} = {name!r}: unit {unit} has no such {causality}; there are {there}")
         if port.causality != causality:
-            raise UsageError(f"{where} = {name!r}: is an {port.causality} of unit {unit}, must be an {causality}".replace("an para", "a para"))
+            raise UsageError(f"{where} = {name!r}: is of causality {port.causality} in unit {unit}, must be {causality}")
         if port.kind != "Real":
             raise UsageError(f"{where} = {name!r}: is {port.kind} in unit {unit}, must be Real")
         return port
