@@ -91,8 +91,8 @@ def open_bonded(scene: General) -> Iterator[Bonded]:
         impedance, mobility = wiring.fmus[table.impedance], wiring.fmus[table.mobility]
         wiring.connections()
         impedance.initialize(scene.settings[table.impedance]["parameters"], inputs=scene.settings[table.impedance]["inputs"])
-        pulls: dict[str, object] = {}
+        inputs = dict(scene.settings[table.mobility]["inputs"])
         for pair, name in zip(bond.pairs, bond.effort_inputs, strict=True):
-            pulls[name] = impedance.get(pair.effort) * (-1.0 if pair.reverse else 1.0)
-        mobility.initialize(scene.settings[table.mobility]["parameters"], inputs={**scene.settings[table.mobility]["inputs"], **pulls})
+            inputs[name] = impedance.get(pair.effort) * (-1.0 if pair.reverse else 1.0)
+        mobility.initialize(scene.settings[table.mobility]["parameters"], inputs=inputs)
         yield Bonded(scene, wiring)

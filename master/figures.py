@@ -5,6 +5,7 @@ Lines differ in dash and marker as well as in colour, so that a grey print reads
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -148,8 +149,7 @@ def energy(path: Path, signals: Table, kinds: Mapping[str, str]) -> None:
 
     def of(kind: str) -> dict[str, np.ndarray]:
         found = {name: signals.column(name) for name in kinds if kinds[name] == kind}
-        short = {name: HANG_OFF.get(name, name.removesuffix("_energy").removesuffix("_work").removesuffix("_dissipation")) for name in found}
-        return {short[name]: column - column[0] for name, column in found.items()}
+        return {re.sub("_(energy|work|dissipation)$", "", HANG_OFF.get(n, n)): column - column[0] for n, column in found.items()}
 
     panels_of = {"Through the bond, work done on": of("bond"), "Supplied from outside": of("supplied")}
     panels_of |= {"Stored": of("stored"), "Dissipated": of("dissipated")}

@@ -105,7 +105,9 @@ class Ledger:
     check is the bond's residual alone, summed with its sign; `idle` is then the power [W] that counts as nothing.
     """
 
-    def __init__(self, sources: Sequence[tuple[Source, Columns]], tolerance: float = 1e-8, action: Action = "stop", idle: Idle | None = None) -> None:
+    def __init__(
+        self, sources: Sequence[tuple[Source, Columns]], tolerance: float = 1e-8, action: Action = "stop", idle: Idle | None = None
+    ) -> None:
         self.tolerance, self.action, self._idle = tolerance, action, idle
         self._accounts = [_Account(fmu, columns) for fmu, columns in sources]
         self._refused = 0
@@ -129,7 +131,7 @@ class Ledger:
 
     @property
     def row(self) -> list[float]:
-        """The columns after the last step, the residual of that step, its running sum, running closure, exchanged energy and what is allowed [J]."""
+        """The columns after the last step, the residual of that step, its running sum, closure, exchanged energy and what is allowed [J]."""
         columns = [value for account in self._accounts for value in account.last.tolist()]
         return [*columns, self.step_residual, self.interface_residual, self.closure, self.exchanged, self.allowed]
 
@@ -194,7 +196,8 @@ class Ledger:
 
     def _sent_back(self, time: float, closure: float, residual: float, exchanged: float, allowed: float) -> bool:
         """Deal with a violation; True if the step is to be repeated."""
-        own = ["the units report no energies"] if not self._accounts else [f"{account.fmu.name}'s own balance is off by {account.balance:.2g} J" for account in self._accounts]
+        own = [f"{account.fmu.name}'s own balance is off by {account.balance:.2g} J" for account in self._accounts]
+        own = own or ["the units report no energies"]
         text = (
             f"energy check failed at {time:.9g} s: closure error {closure:.3g} J of {exchanged:.3g} J exchanged "
             f"(allowed {allowed:.3g} J); in this step the bond made {residual:.3g} J, {', '.join(own)}"
