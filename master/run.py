@@ -67,7 +67,7 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
             started = clock.perf_counter()
             ending = _march(drive, recorder, scene, screen, patience)
             wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
-            if ending.status in ("completed", "interrupted"):  # else the FMUs may stand in the middle of a step
+            if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
                 recorder.record_shape(drive.time)
             account = {"coupling": drive.scheme, **_facts(drive), **asdict(ending), **asdict(drive.effort), **wall, **drive.ledger.summary()}
             account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}

@@ -69,7 +69,8 @@ def test_it_runs_like_any_other_and_its_ledger_closes(folder, tmp_path, capsys):
     code, summary = ran(folder, tmp_path)
     assert code == 0
     assert summary["ledger_closure_J"] <= 1e-9 * summary["exchanged_energy_J"]
-    assert summary["macro_steps"] == summary["mobility_solves"] / 2 - 0.5 == 50 or summary["impedance_solves"] <= 3 * 50
+    assert summary["macro_steps"] == 50
+    assert summary["impedance_solves"] <= 3 * 50
     found = columns(tmp_path)
     # damped oscillator 2 x'' + 0.1 x' + 4 x = 0, midpoint rule: second order
     decay, w = 0.1 / 4.0, np.sqrt(2.0 - (0.1 / 4.0) ** 2)
@@ -91,7 +92,7 @@ def test_without_reported_energies_the_check_is_the_residual_alone_and_says_so(f
 @pytest.mark.parametrize("scene", ["tied", "silent"])
 def test_without_rollback_it_says_that_nothing_is_iterated_and_what_is_left(folder, tmp_path, capsys, scene):
     named = 'bond.impedance_derivative="impedance"', 'bond.mobility_derivative="mobility"'
-    code, summary = ran(folder, tmp_path, "coupling.rollback=false", "coupling.energy_check=0.5", *named, scene=scene)
+    code, summary = ran(folder, tmp_path, "coupling.rollback=false", "coupling.energy_check=2.0", *named, scene=scene)
     assert code == 0
     assert summary["impedance_solves"] == summary["mobility_solves"] == summary["macro_steps"] == 50
     assert summary["interface_residual_J"] > 1e-6
@@ -117,7 +118,7 @@ MISTAKES = {
     "no FMU": ('units.coil.fmu="tied.toml"', "units.coil.fmu = 'tied.toml': "),
     "unknown unit": ('bond.impedance="cable"', "bond.impedance = 'cable': must be one of coil, mass"),
     "one unit twice": ('bond.mobility="coil"', "bond.mobility = 'coil': must be another unit"),
-    "unknown port": ('bond.pairs=[{effort="pull", flow="velocity", floor=1}]', "bond.pairs[1].effort = 'pull': unit coil has no such output"),
+    "unknown port": ('bond.pairs=[{effort="pull", flow="velocity", floor=1}]', "bond.pairs[1].effort = 'pull': unit coil has no such"),
     "wrong causality": (
         'bond.pairs=[{effort="velocity", flow="velocity", floor=1}]',
         "bond.pairs[1].effort = 'velocity': is of causality input in unit coil, must be output",
