@@ -131,7 +131,7 @@ class Ledger:
 
     @property
     def row(self) -> list[float]:
-        """The columns after the last step, the residual of that step, its running sum, closure, exchanged energy and what is allowed [J]."""
+        """The columns after the last step, the residual of that step, its running sum, closure, exchanged energy, what is allowed [J]."""
         columns = [value for account in self._accounts for value in account.last.tolist()]
         return [*columns, self.step_residual, self.interface_residual, self.closure, self.exchanged, self.allowed]
 

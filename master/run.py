@@ -69,7 +69,8 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
             wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
             if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
                 recorder.record_shape(drive.time)
-            account = {"coupling": drive.scheme, **_facts(drive), **asdict(ending), **asdict(drive.effort), **wall, **drive.ledger.summary()}
+            account = {"coupling": drive.scheme, **_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
+            account |= drive.ledger.summary()
             account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}
             account |= {"energy_check": ending.message if ending.status == "stopped" else drive.ledger.verdict()}
             result = _write(scene, recorder, account, scratch, drive.ledger.kinds)

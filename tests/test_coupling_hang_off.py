@@ -19,7 +19,7 @@ def moving(name, changes, step, duration):
 def test_two_turns_of_yaw_and_a_roll_of_sixty_degrees_leave_no_gap_and_a_closed_ledger():
     """A pinned pipe held 20 m off the centre; the vessel is thrown into a spin by a moment in roll and yaw, then let go."""
     push = (
-        "tables.environment=[{time=0, moment=[0,0,0]}, {time=2, moment=[6e8,0,3e9]}, {time=8, moment=[0,0,3e9]}, "
+        "tables.environment=[{time=0, moment=[0,0,0]}, {time=2, moment=[1.5e8,0,3e9]}, {time=8, moment=[0,0,3e9]}, "
         "{time=30, moment=[0,0,3e9]}, {time=31}]"
     )
     changes = ['pipe.top="pinned"', "vessel.hang_off=[-20.0, 3.0, 2.0]", push, "start.release={}", 'coupling.on_violation="stop"']
@@ -41,10 +41,11 @@ def test_two_turns_of_yaw_and_a_roll_of_sixty_degrees_leave_no_gap_and_a_closed_
 
 
 def final(step, duration=2.0):
-    loaded = moving("paper", [*MOVED, "coupling.tolerance=1e-13"], step, duration)
+    loaded = moving("paper", MOVED, step, duration)
     with open_drive(loaded.sections, prepare(loaded)) as drive:
         while drive.time < duration:
             drive.advance(duration)
+        assert drive.effort.rejected_steps == 0
         pipe, vessel = drive.units["pipe"], drive.units["vessel"]
         names = ("node_position", "node_tension", "end_moment")
         return {name: pipe.get(name) for name in names} | {"position": vessel.get("position")}
