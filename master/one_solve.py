@@ -6,7 +6,7 @@ damper and a mass side by side, and a constant load, under the midpoint rule
 
     s_n - s_(n-1) = -a Z V_(n-1) + b Z (v_n - v_(n-1)),     v_n = 2 V_(n-1) - v_(n-1),     0 <= a <= 2, 0 <= b <= 1,
 
-and likewise r with the identity for Z and the signs reversed. The shares a and b are fitted for every component to the
+and likewise r with the identity for Z. The shares a and b are fitted for every component to the
 steps so far. The bond is then solved for f_v = (1 + Z Y)^-1 (s - Z r), the mobility end steps with f_v, the impedance end
 with the V that it answers. Nothing is iterated, so a residual H (f_v - f) . V is left: the guard of this step.
 """
@@ -21,6 +21,7 @@ from .step import Check, Counters, CouplingFailed, End, Step, accept, within
 
 MEMORY = 0.9  # per step: weight of the past in the fit of the shares
 SMALLEST = 1e-12  # of the data: regularisation of the fit
+LARGEST = (2.0, 1.0)  # shares of a passive end
 
 
 class History:
@@ -52,7 +53,7 @@ class History:
         ridge = SMALLEST * size[seen]
         system = self._normal[seen] + ridge[:, None, None] * np.eye(2)
         right = self._right[seen] + ridge[:, None] * self._shares[seen]
-        self._shares[seen] = np.linalg.solve(system, right[:, :, None])[:, :, 0]
+        self._shares[seen] = np.clip(np.linalg.solve(system, right[:, :, None])[:, :, 0], 0.0, LARGEST)
 
 
 class OneSolve:
@@ -84,7 +85,7 @@ class OneSolve:
         self._Z = Z if slope is None else -slope
         self._Y = Y if mobility is None else mobility
         self._reaction.add(effort + self._Z @ flow, flow, self._Z)
-        self._drift.add(flow - self._Y @ held, flow, -np.eye(self.bond.size))
+        self._drift.add(flow - self._Y @ held, flow, np.eye(self.bond.size))
         done = Step(time, step, flow, effort, step * float((held - effort) @ flow), 1)
         self.counters.steps += 1
         self.counters.rounds.append(1)
