@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
 
 def statics(options: argparse.Namespace) -> int:
     """Print the coupled equilibrium of a scene."""
-    scene = scenes_of.load(options.scene, options.changes)
+    scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     from master.statics import report  # works with the units' packages, which a run never imports
 
     found = report(scene)
@@ -40,7 +40,7 @@ def statics(options: argparse.Namespace) -> int:
 
 def export(options: argparse.Namespace) -> int:
     """Write the FMUs of a scene into a folder."""
-    scene = scenes_of.load(options.scene, options.changes)
+    scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     folder = _folder(options.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
