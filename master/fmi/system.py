@@ -19,10 +19,6 @@ from .description import base_unit, scalar_names
 SSD, SSC = "http://ssp-standard.org/SSP1/SystemStructureDescription", "http://ssp-standard.org/SSP1/SystemStructureCommon"
 OSP_SYSTEM = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 OSP_MODEL = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
-ECCO = {  # power residual relative to 1 kW; the default change rate of libcosim, 0.2 at most, only ever shortens the step
-    "SafetyFactor": 0.8, "StepSize": 0.01, "MinimumStepSize": 1e-3, "MaximumStepSize": 0.1, "MinimumChangeRate": 0.2,
-    "MaximumChangeRate": 1.5, "ProportionalGain": 0.2, "IntegralGain": 0.15, "RelativeTolerance": 1e-3, "AbsoluteTolerance": 1.0,
-}  # fmt: skip
 
 
 class Wire(NamedTuple):
@@ -40,7 +36,6 @@ WIRES = (
     Wire("pipe", "force", "vessel", "force"),
     Wire("pipe", "moment", "vessel", "moment"),
 )
-BONDS = ((WIRES[0], WIRES[2]), (WIRES[1], WIRES[3]))  # a flow and the effort it does work with
 PORTS = {  # unit -> (port element of the OSP, name, its effort and flow: element, FMI name, unit)
     "pipe": (
         ("LinearMechanicalPort", "hang-off", ("Force", "force", "N"), ("LinearVelocity", "velocity", "m/s")),
@@ -93,7 +88,10 @@ def structure_description(duration: float) -> Element:
 
 
 def osp_structure(fmus: Mapping[str, Path], macro_step: float) -> Element:
-    """OspSystemStructure.xml: fixed steps; with ``ecco`` as Algorithm, libcosim varies the step by the bonds' residual power."""
+    """OspSystemStructure.xml: fixed steps, plain connections.
+
+    Power bonds for ECCO are added through libcosim's interface: its reader of this file accepts one only (libcosimpy 0.0.6).
+    """
     root = Element("OspSystemStructure", xmlns=OSP_SYSTEM, version="0.1")
     SubElement(root, "BaseStepSize").text = repr(macro_step)
     SubElement(root, "Algorithm").text = "fixedStep"
@@ -101,16 +99,11 @@ def osp_structure(fmus: Mapping[str, Path], macro_step: float) -> Element:
     for name, path in fmus.items():
         SubElement(simulators, "Simulator", name=name, source=path.name)
     connections = SubElement(root, "Connections")
-    for bond, wires in zip(("force", "moment"), BONDS, strict=True):
-        for i in range(3):
-            for wire in wires:
-                start, end = list(_scalars(wire))[i]
-                connection = SubElement(connections, "VariableConnection", powerBond=f"{bond}[{i + 1}]")
-                SubElement(connection, "Variable", simulator=wire.source, name=start, causality="input")  # of the bond
-                SubElement(connection, "Variable", simulator=wire.target, name=end, causality="output")
-    ecco = SubElement(root, "EccoConfiguration")
-    for name, value in ECCO.items():
-        SubElement(ecco, name).text = repr(value)
+    for wire in WIRES:
+        for start, end in _scalars(wire):
+            connection = SubElement(connections, "VariableConnection")
+            SubElement(connection, "Variable", simulator=wire.source, name=start)
+            SubElement(connection, "Variable", simulator=wire.target, name=end)
     return root
 
 
