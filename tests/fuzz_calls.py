@@ -28,7 +28,8 @@ class Caller:
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda *words: self.messages.append(words[-1]))
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        self.fmu = fmi2.FMU2Slave(guid=model.guid, modelIdentifier=model.coSimulation.modelIdentifier, unzipDirectory=folder, instanceName="f")
+        identifier = model.coSimulation.modelIdentifier
+        self.fmu = fmi2.FMU2Slave(guid=model.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName="f")
         self.fmu.instantiate(callbacks=callbacks, loggingOn=True)
         self.component = ctypes.c_void_p(self.fmu.component)
         self.variables = model.modelVariables
@@ -134,7 +135,7 @@ class Caller:
         self.fmu.freeInstance()
 
 
-MOVES = [name for name, move in vars(Caller).items() if callable(move) and name not in ("__init__", "call", "reals", "of", "_time", "close")]
+MOVES = [name for name in vars(Caller) if not name.startswith("_") and name not in ("call", "reals", "of", "close")]
 
 
 def main(path: str, seed: str, seconds: str) -> int:
