@@ -1,6 +1,6 @@
-"""A foreign host on exported files, as a program: ``run_host.py HOST FOLDER STEP END``.
+"""A foreign host on exported files, as a program: ``run_host.py HOST FOLDER STEP END RESULT``.
 
-Prints one line of JSON per step: time, hang-off position (3) [m], work done on the pipe and on the vessel through the bond [J].
+Writes to the file RESULT one line of JSON per step: time, hang-off position (3) [m], work done on the pipe and on the vessel through the bond [J].
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ Rows = Iterator[list[float]]
 
 
 def libcosim(folder: Path, step: float, end: float) -> Rows:
+    """The OSP structure with its fixed step."""
     from libcosimpy.CosimExecution import CosimExecution
 
     structure = folder / "OspSystemStructure.xml"
@@ -52,6 +53,7 @@ def ecco(folder: Path, step: float, end: float) -> Rows:
 
 
 def ecos(folder: Path, step: float, end: float) -> Rows:
+    """The SSP file."""
     from ecospy import EcosSimulation
 
     with EcosSimulation(ssp_path=str(folder / "system.ssp"), step_size=step) as simulation:
@@ -88,5 +90,6 @@ def _text(name: Any) -> str:
 
 
 if __name__ == "__main__":
-    for row in globals()[sys.argv[1]](Path(sys.argv[2]), float(sys.argv[3]), float(sys.argv[4])):
-        sys.stdout.write(json.dumps(row) + "\n")
+    with open(sys.argv[5], "w", encoding="utf-8") as result:
+        for row in globals()[sys.argv[1]](Path(sys.argv[2]), float(sys.argv[3]), float(sys.argv[4])):
+            result.write(json.dumps(row) + "\n")

@@ -58,12 +58,13 @@ def installed(tmp_path_factory):
 def run(host, exported, packages, step):
     """Rows (time, position, works) of a host's run, and its wall time, s."""
     began = time.perf_counter()
-    command = [sys.executable, str(PROGRAM), host, str(exported), str(step), str(END)]
+    result = exported / f"{host}_{step}.jsonl"
+    command = [sys.executable, str(PROGRAM), host, str(exported), str(step), str(END), str(result)]
     done = subprocess.run(command, env={**os.environ, "PYTHONPATH": str(packages)}, capture_output=True, text=True)
     if "libtbb.so.12" in done.stderr:
         pytest.skip("ecospy needs the system library libtbb12")
     assert done.returncode == 0, done.stderr[-2000:]
-    return np.array([json.loads(line) for line in done.stdout.splitlines() if line.startswith("[")]), time.perf_counter() - began
+    return np.array([json.loads(line) for line in result.read_text().splitlines()]), time.perf_counter() - began
 
 
 @pytest.mark.parametrize("host", PACKAGES)
