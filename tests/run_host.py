@@ -1,6 +1,7 @@
 """A foreign host on exported files, as a program: ``run_host.py HOST FOLDER STEP END RESULT``.
 
-Writes to the file RESULT one line of JSON per step: time, hang-off position (3) [m], work done on the pipe and on the vessel through the bond [J].
+Writes to the file RESULT one line of JSON per step: time, hang-off position (3) [m],
+work done on the pipe and on the vessel through the bond [J].
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from master.monolithic import march
 
 PROGRAM = Path(__file__).parent / "run_host.py"
 PACKAGES = {"libcosim": "libcosimpy==0.0.6", "ecco": "libcosimpy==0.0.6", "ecos": "ecospy==0.7.2"}
+ALLOWED = {"ecco": 4e-3}  # m; it chooses its step by itself
 END = 6.0  # s
 CHANGES = ["environment.current.start=0", "environment.current.ramp=2", "vessel.controller.start=1", f"simulation.duration={END}",
            "simulation.snapshots=[]"]  # fmt: skip
@@ -80,14 +81,19 @@ def test_a_foreign_host_comes_closer_to_the_monolithic_solution_with_shorter_ste
         residual = np.abs(rows[:, 4] + rows[:, 5]).max() / np.abs(rows[:, 4]).max()
         sys.stdout.write(f"{host:9} H {step} s: {len(rows)} steps, {error:.1e} m, bond energy {residual:.1e}, wall {wall:.1f} s\n")
         assert rows[-1, 0] >= END - 1e-6
-        assert error < 2e-3
+        assert error < ALLOWED.get(host, 5e-4)
         errors.append(error)
     if host != "ecco":
         assert errors[1] < 0.4 * errors[0]
 
 
-def test_fmpy_simulates_the_ssp(exported):
-    result = simulate_ssp(str(exported / "system.ssp"), stop_time=END - 0.025, step_size=0.05)
-    assert len(result) == round(END / 0.05)
-    pull = np.column_stack([result[f"pipe.force[{i}]"] for i in (1, 2, 3)])
-    assert np.isfinite(pull).all()
+def test_fmpy_simulates_the_ssp(exported, reference):
+    """It sets all inputs to zero in the first step, so that the vessel is let go for so long: an offset of the velocity remains."""
+    step = 0.05
+    result = simulate_ssp(str(exported / "system.ssp"), stop_time=END - 0.5 * step, step_size=step)
+    velocity = np.column_stack([np.append(0.0, result[f"vessel.end_velocity[{i}]"]) for i in (1, 2, 3)])
+    moved = np.cumsum(0.5 * step * (velocity[1:] + velocity[:-1]), axis=0)
+    error = np.abs(moved - (reference - reference[0])).max()
+    sys.stdout.write(f"fmpy SSP  H {step} s: {len(result)} steps, {error:.1e} m\n")
+    assert len(result) == round(END / step)
+    assert error < 0.03
