@@ -12,6 +12,7 @@ from typing import Any
 
 from master import scene as scenes_of
 from master.errors import UsageError
+from master.fmi.system import write_system
 from master.prepared import prepare
 
 Command = Callable[[argparse.Namespace], int]
@@ -39,7 +40,7 @@ def statics(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write the FMUs of a scene into a folder."""
+    """Write the FMUs of a scene, and the files that connect them, into a folder."""
     scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     folder = _folder(options.output)
     try:
@@ -47,7 +48,10 @@ def export(options: argparse.Namespace) -> int:
         tempfile.TemporaryDirectory(dir=folder).cleanup()  # before the work, as a trial
     except OSError as error:
         raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-    for path in prepare(scene, ["--export", str(folder)]).fmus.values():
+    fmus = prepare(scene, ["--export", str(folder)]).fmus
+    simulation = scene.sections.simulation
+    joined = write_system(fmus, folder, simulation.macro_step, simulation.duration) if "vessel" in fmus else []
+    for path in (*fmus.values(), *joined):
         _say(str(path))
     return 0
 
