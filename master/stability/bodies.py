@@ -25,6 +25,7 @@ MASSES = tuple(10.0**k for k in range(2, 9))  # kg
 STEPS = (0.01, 0.05, 0.2, 1.0)  # s
 DURATION = 60.0  # s
 GYRATION = 3.0  # m: the inertia is mass x its square
+TOLERANCE = 1e-9  # of the coupling
 LOST = 1e6  # m: a body this far away has left
 PIPE = {"nodes": 24, "top_position": [804.7189562, 0.0, -800.0], "top_quaternion": [0.0] * 4}
 PIPE_COLUMNS = Columns(
@@ -60,6 +61,7 @@ class Case:
     step: float
     state: State
     duration: float = DURATION
+    tolerance: float = TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ def run(case: Case, rest: Rest) -> Outcome:
     ends = ("end_velocity", "end_angular_velocity")
     body = Half(rest.body, body_parameters(case, rest), ends, BODY_COLUMNS)
     begun, message, gaps, solves, pulls = clock.process_time(), "", np.zeros(2), [0], [float(np.linalg.norm(rest.pull[:3]))]
-    with paired(pipe, body, hang_off(), case.scheme, case.step) as pair:
+    with paired(pipe, body, hang_off(), case.scheme, case.step, case.tolerance) as pair:
         try:
             for _ in pair.run(case.duration):
                 solves.append(pair.coupling.impedance.solves)
