@@ -7,6 +7,7 @@ unit vector of the state, the exchanged values included.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ from master.stability.units.linear_fmu.slave import Mass, MassUnit, Spring, Spri
 
 FREQUENCIES = np.logspace(-1.0, 3.0, 41)  # H sqrt(k / m)
 RATIOS = np.logspace(-3.0, 3.0, 25)  # mass behind the spring over the mass on it
+TOLERANCE = 1e-10  # of the coupling; a long step's round-off is above 1e-12
 GROWTH = 1e-5  # of a step: what round-off makes of a double eigenvalue 1
 COLUMNS = Columns(("kinetic_energy", "elastic_energy"), (), ("damping_dissipation",), "bond_work")
 EXACT_LIMIT = 2.0
@@ -69,7 +71,6 @@ class UnitEnd:
 
     def commit(self) -> None:
         """See `master.coupling.End`."""
-        self._saved = self.unit.state
 
     def cancel(self) -> None:
         """See `master.coupling.End`."""
@@ -89,19 +90,23 @@ def spectral_radius(scheme: str, spring: SpringUnit, mass: MassUnit, step: float
             UnitEnd(spring, "velocity", first, "impedance", -1.0, effort),
             UnitEnd(mass, "force", second, "mobility", 1.0, flow),
         )
-        done = coupling(scheme, *ends, scalar_bond(), step, 1e-12).advance(0.0, step)
+        done = coupling(scheme, *ends, scalar_bond(), step, TOLERANCE).advance(0.0, step)
+        if done.step < step:
+            return math.inf  # the step was halved: not this step
         exchanged = [*done.effort, *done.flow] if explicit else []
         columns.append(np.concatenate([spring.state.z, mass.state.z, exchanged]))
     return float(np.abs(np.linalg.eigvals(np.column_stack(columns))).max())
 
 
 def stability_map(frequencies: np.ndarray = FREQUENCIES, ratios: np.ndarray = RATIOS) -> dict[str, np.ndarray]:
-    """Spectral radius (ratios, frequencies) by scheme; unit mass and stiffness, so that the step is the frequency."""
+    """Spectral radius (ratios, frequencies) by scheme: ground, spring k, mass, spring k, mass m; k = m = 1, so that the step is the
+    frequency. The first spring leaves the pair no free motion, whose double eigenvalue 1 round-off would split.
+    """
     found = {scheme: np.empty((len(ratios), len(frequencies))) for scheme in SCHEMES}
     mass = MassUnit(Mass())
     mass.initialize(0.0, {})
     for i, ratio in enumerate(ratios):
-        spring = SpringUnit(Spring(mass=float(ratio)))
+        spring = SpringUnit(Spring(mass=float(ratio), stiffness=1.0))
         spring.initialize(0.0, {})
         for j, frequency in enumerate(frequencies):
             for scheme in SCHEMES:
@@ -109,7 +114,7 @@ def stability_map(frequencies: np.ndarray = FREQUENCIES, ratios: np.ndarray = RA
     return found
 
 
-def grows(scheme: str, frequency: float, folder: Path, steps: int = 400) -> bool:
+def grows(scheme: str, frequency: float, folder: Path, steps: int = 200) -> bool:
     """Whether the energy of mass and spring FMU, coupled with steps of this H sqrt(k / m), grows in a run."""
     spring = Half(built(SPRING, folder), {}, ("end_force",), COLUMNS)
     mass = Half(built(MASS, folder), {"start_velocity": 1.0}, ("end_velocity",), COLUMNS)
@@ -133,11 +138,11 @@ def grows(scheme: str, frequency: float, folder: Path, steps: int = 400) -> bool
 def limits(folder: Path) -> list[Limit]:
     """The limits found with the FMUs."""
     low, high = 1.0, 3.0
-    while high - low > 0.01:
+    while high - low > 0.03:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if grows("serial", middle, folder) else (middle, high)
     serial = 0.5 * (low + high)
-    parallel = [x for x in (0.05, 0.5, 1.5) if not grows("parallel", x, folder, 2000)]
+    parallel = [x for x in (0.05, 0.5, 1.5) if not grows("parallel", x, folder)]
     ours = [x for x in (0.1, 2.0, 30.0, 1000.0) if grows("energy-consistent", x, folder)]
     return [
         Limit("serial", f"{serial:.3f}", f"{EXACT_LIMIT:g}", abs(serial - EXACT_LIMIT) <= 0.02 * EXACT_LIMIT),

@@ -50,13 +50,14 @@ def study(names: Sequence[str], folder: Path, stream: TextIO) -> tuple[str, bool
 def run_bodies(cases: Sequence[bodies.Case], cache: Path, stream: TextIO) -> list[bodies.Outcome]:
     """The outcomes of `cases`, on two processes."""
     with multiprocessing.get_context("spawn").Pool(WORKERS) as pool:
-        rest = pool.apply(_rest, (cache,))
-        jobs = [(case, rest) for case in cases]
+        still = pool.apply(rest, (cache,))
+        jobs = [(case, still) for case in cases]
         done = tqdm(pool.imap(_run, jobs), total=len(jobs), file=stream, disable=not stream.isatty(), leave=False, unit="run")
         return list(done)
 
 
-def _rest(cache: Path) -> bodies.Rest:
+def rest(cache: Path) -> bodies.Rest:
+    """The pipe of the cases at rest, its FMU and the body's built if need be."""
     pipe = Recipe(Path(pipe_fmu.__file__).parent, "slave.PipeUnit", bodies.PIPE)
     return bodies.at_rest(built(pipe, cache), built(BODY, cache))
 
