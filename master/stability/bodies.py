@@ -81,8 +81,8 @@ class Outcome:
     most_solves: int
     steps: int
     rejected: int
-    least_pull_kN: float  # of the mean pulls over a step
-    largest_pull_kN: float
+    least_pull: float  # kN, of the mean pulls over a step
+    largest_pull: float
     cpu_s: float
     message: str = ""
 
@@ -160,7 +160,7 @@ def run(case: Case, rest: Rest) -> Outcome:
         done, ledger = pair.coupling.counters, pair.ledger
         return Outcome(
             case.state.name, case.mass, case.step, case.scheme, not message, pair.time,
-            ledger.interface_residual / max(ledger.exchanged, 1e-300), *map(float, gaps),
+            ledger.interface_residual / max(ledger.exchanged, 1e-300), float(gaps[0]), float(gaps[1]),
             float(np.median(np.diff(solves))) if len(solves) > 1 else math.nan,
             int(np.diff(solves).max(initial=0)), done.steps, getattr(done, "rejected_steps", 0),
             min(pulls) / 1e3, max(pulls) / 1e3, clock.process_time() - begun, message,

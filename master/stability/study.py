@@ -100,7 +100,8 @@ def _bodies_table(outcomes: Sequence[bodies.Outcome]) -> str:
     )
     rows = [
         f"  {o.state:9} {o.mass_kg:8.0e} {o.step_s:6g} {o.residual:9.1e} {o.gap_m:8.0e} {o.solves:6.1f} {o.most_solves:4d} {o.rejected:4d} "
-        f"{o.least_pull_kN:5.0f} to {o.largest_pull_kN:5.0f} {ended('serial', o):>12} {ended('parallel', o):>12} {_verdict(o.holds)} {o.message}"
+        f"{o.least_pull:5.0f} to {o.largest_pull:5.0f} {ended('serial', o):>12} {ended('parallel', o):>12} "
+        f"{_verdict(o.holds)} {o.message}"
         for o in outcomes
         if o.scheme == "energy-consistent"
     ]
