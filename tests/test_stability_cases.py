@@ -7,6 +7,7 @@ import pytest
 
 from master.prepare import fmu_folder
 from master.stability import bodies, limits, published, study
+from master.stability.units.body_fmu.slave import Body, BodyUnit
 from master.stability.units.linear_fmu.exact import transition
 from master.stability.units.linear_fmu.slave import Mass, MassUnit, Spring, SpringUnit
 from master.stability.units.manipulator_fmu import model
@@ -125,3 +126,17 @@ def test_the_states_are_what_they_are_called(rest):
     assert pull["taut"].least_pull > 0.7 * still
     assert pull["slack"].least_pull < 0.15 * still
     assert pull["snapping"].largest_pull > 2.0 * still
+
+
+def test_a_shaken_body_has_the_impulse_of_its_load_at_any_step_and_turns_by_its_angle():
+    # m v' = f cos(w t): v = f sin(w t) / (m w), exactly at the end of every step; a constant spin turns by spin x time
+    body = Body(mass=4.0, inertia=2.0, shaking_force=(3.0, 0.0, 0.0), period=7.0, start_rotation=(0.0, 0.6, 0.0))
+    unit, still = BodyUnit(body), {"force": np.zeros(3), "moment": np.zeros(3)}
+    unit.initialize(0.0, {})
+    for i in range(5):
+        unit.step(1.3 * i, 1.3, still)
+    rate, end = 2.0 * math.pi / 7.0, 5 * 1.3
+    np.testing.assert_allclose(unit.output("end_velocity"), [3.0 * math.sin(rate * end) / (4.0 * rate), 0.0, 0.0], atol=1e-14)
+    np.testing.assert_allclose(unit.output("quaternion"), [math.cos(0.3 * end), 0.0, math.sin(0.3 * end), 0.0], atol=1e-14)
+    kinetic = unit.output("kinetic_energy")[0] - 0.5 * 2.0 * 0.6**2
+    assert unit.output("environment_work")[0] == pytest.approx(kinetic, rel=1e-12)
