@@ -65,6 +65,19 @@ def scenes(options: argparse.Namespace) -> int:
     return 0
 
 
+def stability(options: argparse.Namespace) -> int:
+    """Run the stability cases; exit code 1 where a limit is not kept."""
+    folder = _folder(options.output)
+    from master.stability.study import NAMES, study  # takes a second to import
+
+    for name in options.cases:
+        if name not in NAMES:
+            raise UsageError(f"case = {name!r}: must be one of {', '.join(NAMES)}")
+    text, kept = study(options.cases, folder, sys.stderr)
+    _say(f"{text}\ntables in {folder}")
+    return 0 if kept else 1
+
+
 def _folder(path: Path) -> Path:
     """`path`, if it is a folder or can become one."""
     for place in (path, *path.parents):

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from master import stability
 from master.bond import Bond, FmuEnd, end_value_ends, impedance_end, mobility_end
 from master.coupling import Check, EnergyConsistent, Explicit, OneSolve, coupling
 from master.fmi.build import Recipe, build_fmu
@@ -19,7 +20,7 @@ from master.ledger import Action, Columns, Ledger
 
 HERE = Path(__file__).parent
 SPRING = Recipe(HERE / "spring_fmu", "slave.SpringUnit", {}, "Six springs")
-BODY = Recipe(HERE / "body_fmu", "slave.BodyUnit", {})
+BODY = Recipe(Path(stability.__file__).parent / "units" / "body_fmu", "slave.BodyUnit", {})
 SPRING_COLUMNS = Columns(("kinetic_energy", "elastic_energy"), ("current_work",), ("drag_dissipation",), "top_work")
 BODY_COLUMNS = Columns(("kinetic_energy", "restoring_energy"), ("environment_work",), ("damping_dissipation",), "bond_work")
 
