@@ -1,59 +1,34 @@
-"""Is an equilibrium stable, and if not, which way does it fall?
+"""Is an equilibrium stable? Symmetric part of the static tangent with the ends held: positive definite if any small push is opposed.
 
-Symmetric part of the static tangent with the ends held; positive definite means that any small push is opposed. A neutral motion, as the
-turning of a slack line about the vertical through its two ends, counts as stable.
+A neutral motion, as the turning of a slack line about the vertical through its two ends, counts as stable.
 """
 
 import math
 
 import numpy as np
 
-from .block_tridiagonal import SIZE, condense, factorize, substitute
+from .block_tridiagonal import SIZE
 from .compiled import kernel
 from .line import Array, Line
 from .so3 import matrix
 
-_SWEEPS = 12  # of inverse iteration
-_LARGEST_SHIFT = 1e12
-_HELD = 1e6  # stiffness over metric given to what is held
+NEUTRAL = 1e-8  # of the metric: stiffness that counts as none
+_HELD = 1e6  # of the metric: stiffness given to what is held
 
 
-class Tangent:
-    """Symmetric tangent of a line with its ends held, blocks (n, 6, 6) and (n - 1, 6, 6), and the metric (n, 6) it is compared with."""
+def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], metric: Array) -> bool:
+    """Whether the tangent `blocks` (n, 6, 6), (n - 1, 6, 6) x 2 of free ends is positive definite once they are held.
 
-    def __init__(self, line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], metric: Array) -> None:
-        diagonal, lower, upper = blocks
-        self.diagonal = 0.5 * (diagonal + diagonal.transpose(0, 2, 1))
-        self.upper = 0.5 * (upper + lower.transpose(0, 2, 1))
-        self.metric = metric
-        for node, free in ((0, _foot(line, quaternion)), (-1, _top(line))):
-            self.diagonal[node] = free @ self.diagonal[node] @ free + (np.eye(SIZE) - free) * _HELD * metric[node]
-            self.upper[node] = free @ self.upper[node] if node == 0 else self.upper[node] @ free
-
-    def _shifted(self, shift: float) -> Array:
-        out = self.diagonal.copy()
-        out[:, range(SIZE), range(SIZE)] += shift * self.metric
-        return out
-
-    def positive(self, shift: float) -> bool:
-        """Whether the tangent plus `shift` times the metric is positive definite."""
-        return bool(_cholesky(self._shifted(shift), self.upper.copy()))
-
-    def softest(self, shift: float) -> Array:
-        """Motion (n, 6) of lowest stiffness over metric, of largest entry 1, by inverse iteration; `shift` is a first guess."""
-        while not self.positive(shift) and shift < _LARGEST_SHIFT:
-            shift *= 4.0
-        diagonal, upper = self._shifted(shift), self.upper.copy()
-        lower = np.ascontiguousarray(upper.transpose(0, 2, 1))
-        exchanges = np.empty((len(upper), SIZE), np.int64)
-        factorize(diagonal, lower, upper, exchanges)
-        x = np.random.default_rng(0).normal(size=self.metric.shape)
-        for _ in range(_SWEEPS):
-            right = -self.metric * x
-            condense(diagonal, lower, exchanges, right)
-            substitute(upper, right, np.linalg.solve(diagonal[-1], -right[-1]), x)
-            x /= x.flat[np.argmax(np.abs(x))]
-        return x
+    quaternion (n, 4); metric (6,): stiffness [N/m, N m] that is compared with.
+    """
+    diagonal, lower, upper = blocks
+    block = 0.5 * (diagonal + diagonal.transpose(0, 2, 1))
+    side = 0.5 * (upper + lower.transpose(0, 2, 1))
+    for node, free in ((0, _foot(line, quaternion)), (-1, _top(line))):
+        block[node] = free @ block[node] @ free + (np.eye(SIZE) - free) * _HELD * metric
+        side[node] = free @ side[node] if node == 0 else side[node] @ free
+    block[:, range(SIZE), range(SIZE)] += NEUTRAL * metric
+    return bool(_cholesky(block, side))
 
 
 def _foot(line: Line, quaternion: Array) -> Array:

@@ -129,7 +129,7 @@ MISTAKES = {
     ),
     "no floor": ('bond.pairs=[{effort="force", flow="velocity", floor=0}]', "bond.pairs[1].floor = 0: must be > 0"),
     "derivative": ('bond.impedance_derivative="force"', "bond.impedance_derivative = 'force': has 3 values, must have 6 x 6"),
-    "recorded": ('units.mass.outputs=["place"]', "units.mass.outputs = 'place': unit mass has no such output"),
+    "recorded": ('units.mass.outputs=["nowhere"]', "units.mass.outputs = 'nowhere': unit mass has no such output"),
     "parameter": ("units.mass.parameters={weight=1}", "units.mass.parameters.weight = 1: unknown parameter"),
     "input": ("units.mass.inputs={force=[1]}", "units.mass.inputs.force = [1]: must have 3 values"),
     "connection": ('connections=[{from="coil.stretch", to="mass.force"}]', "connections[1]: coil.stretch has 6 values and mass.force 3"),

@@ -89,7 +89,8 @@ def mean_contact(bed, ends, new_z, dt=0.1):
     vector, matrix = np.zeros(12), np.zeros((12, 12))
     row = np.zeros(9)
     old_z = np.array([-0.02, 0.01, 0.005])
-    lost = loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, np.array(bed), old_z, np.array(new_z), ends, row, row, True, True, vector, matrix)
+    sides = np.array(bed), old_z, np.array(new_z), ends, row, row
+    lost = loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, *sides, True, True, vector, matrix)
     return lost, vector
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from master.bond import Bond, FmuEnd, Pair, impedance_end, mobility_end
-from master.coupling import EnergyConsistent, Explicit, coupling
+from master.coupling import EnergyConsistent, Explicit, OneSolve, coupling
 from master.fmi.build import Recipe, cached_fmu
 from master.fmu import Fmu
 from master.ledger import Columns, Ledger
@@ -39,7 +39,7 @@ class Pairing:
 
     impedance: Fmu
     mobility: Fmu
-    coupling: EnergyConsistent | Explicit
+    coupling: EnergyConsistent | Explicit | OneSolve
     ledger: Ledger
     time: float
 

@@ -46,9 +46,11 @@ class Limit:
 class UnitEnd:
     """An end of a bond that is a unit of this process: state, port to set, ports to read."""
 
-    def __init__(self, unit: Any, held: str, answer: str, derivative: str, sign: float, before: float) -> None:
+    rollback = True
+
+    def __init__(self, unit: Any, held: str, mean: str, answer: str, derivative: str, sign: float, before: float) -> None:
         self.unit, self.solves = unit, 0
-        self._held, self._answer, self._derivative, self._sign, self._before = held, answer, derivative, sign, before
+        self._held, self._mean, self._answer, self._derivative, self._sign, self._before = held, mean, answer, derivative, sign, before
         self._saved = unit.state
 
     def begin(self) -> None:
@@ -64,6 +66,10 @@ class UnitEnd:
     def result(self) -> np.ndarray:
         """The value exchanged before the step."""
         return np.array([self._before])
+
+    def mean(self) -> np.ndarray:
+        """See `master.coupling.End`."""
+        return self.unit.output(self._mean)
 
     def derivative(self) -> np.ndarray:
         """See `master.coupling.End`."""
@@ -87,8 +93,8 @@ def spectral_radius(scheme: str, spring: SpringUnit, mass: MassUnit, step: float
         effort, flow = unit[5:] if explicit else (0.0, 0.0)
         first, second = ("end_force", "end_velocity") if explicit else ("force", "velocity")
         ends = (
-            UnitEnd(spring, "velocity", first, "impedance", -1.0, effort),
-            UnitEnd(mass, "force", second, "mobility", 1.0, flow),
+            UnitEnd(spring, "velocity", "force", first, "impedance", -1.0, effort),
+            UnitEnd(mass, "force", "velocity", second, "mobility", 1.0, flow),
         )
         done = coupling(scheme, *ends, scalar_bond(), step, TOLERANCE).advance(0.0, step)
         if done.step < step:
