@@ -69,6 +69,15 @@ def parser() -> argparse.ArgumentParser:
     command(
         "scenes", commands.scenes, "List the built-in scenes.", "Their files are in the package's folder master/scenes."
     )
+    stability = command(
+        "stability",
+        commands.stability,
+        "Run the coupling's stability cases; write their tables and a stability map.",
+        "files written: published.csv, limits.csv, stability_map.csv, stability_map.png, bodies.csv; all of it takes about ten minutes",
+    )
+    which = "oscillator, schueller, quarter-car, manipulator, limits, bodies (default: all)"
+    stability.add_argument("cases", nargs="*", metavar="CASE", help=which)
+    stability.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("results/stability"), help="folder of the tables")
     return top
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .fmu import Fmu, Names
+from .fmu import Fmu, Names, StepFailed
 
 Vector = NDArray[Any]
 Matrix = NDArray[Any]
@@ -26,12 +26,22 @@ _RELATIVE_INCREMENT = 1e-3  # of the effort
 
 @dataclass(frozen=True)
 class Pair:
-    """An effort port and its flow port; below `floor` a flow counts as rest."""
+    """An effort port and its flow port; below `floor` a flow counts as rest.
+
+    `effort` is an output of the impedance end, `flow` one of the mobility end; the inputs they feed have the same names, or
+    `effort_input` and `flow_input`. `end_effort` and `end_flow` are outputs with the values at the end of a step, for the
+    schemes that exchange those. `reverse`: the effort port carries what acts on the impedance end itself.
+    """
 
     effort: str
     flow: str
     floor: float
     size: int = 3
+    effort_input: str = ""
+    flow_input: str = ""
+    end_effort: str = ""
+    end_flow: str = ""
+    reverse: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,13 +52,38 @@ class Bond:
 
     @property
     def efforts(self) -> tuple[str, ...]:
-        """Names of the effort ports."""
+        """Names of the effort outputs, means over the step."""
         return tuple(pair.effort for pair in self.pairs)
 
     @property
     def flows(self) -> tuple[str, ...]:
-        """Names of the flow ports."""
+        """Names of the flow outputs, means over the step."""
         return tuple(pair.flow for pair in self.pairs)
+
+    @property
+    def effort_inputs(self) -> tuple[str, ...]:
+        """Names of the mobility end's inputs."""
+        return tuple(pair.effort_input or pair.effort for pair in self.pairs)
+
+    @property
+    def flow_inputs(self) -> tuple[str, ...]:
+        """Names of the impedance end's inputs."""
+        return tuple(pair.flow_input or pair.flow for pair in self.pairs)
+
+    @property
+    def end_efforts(self) -> tuple[str, ...]:
+        """Names of the effort outputs at the end of a step; the means where there are none."""
+        return tuple(pair.end_effort or pair.effort for pair in self.pairs)
+
+    @property
+    def end_flows(self) -> tuple[str, ...]:
+        """Names of the flow outputs at the end of a step; the means where there are none."""
+        return tuple(pair.end_flow or pair.flow for pair in self.pairs)
+
+    @cached_property
+    def signs(self) -> Vector:
+        """Factors from the effort outputs to the pull on the mobility end, (size,)."""
+        return np.repeat([-1.0 if pair.reverse else 1.0 for pair in self.pairs], [pair.size for pair in self.pairs])
 
     @cached_property
     def size(self) -> int:
@@ -78,29 +113,37 @@ class Bond:
         return np.repeat(_RELATIVE_INCREMENT * norms, [pair.size for pair in self.pairs])
 
 
-def hang_off() -> Bond:
-    """The bond of pipe and vessel: force with velocity, moment with angular velocity."""
-    return Bond((Pair("force", "velocity", 1e-6), Pair("moment", "angular_velocity", 1e-8)))
-
-
 class FmuEnd:
     """One end of a bond: an FMU that steps while it holds one set of ports and answers with the conjugate one.
 
-    `derivative` names the FMU's port with d(result)/d(held), row by row, times `sign`; None, or a port that the FMU
-    does not have, leaves the master to difference quotients. Between `begin` and `commit` or `cancel` every `solve`
-    starts from the same saved state.
+    `derivative` names the FMU's port with d(result)/d(held), row by row, times `sign`; without it the FMU's directional
+    derivatives serve, where it provides them, else difference quotients. `mean` names the outputs whose product with what
+    the other end holds is the power, by default the result; `signs` are factors on both. Between `begin` and `commit` or
+    `cancel` every `solve` starts from the same saved state; an end with `rollback` False saves none.
     """
 
-    def __init__(self, fmu: Fmu, held: Names, result: Names, derivative: str | None = None, sign: float = 1.0) -> None:
+    def __init__(
+        self,
+        fmu: Fmu,
+        held: Names,
+        result: Names,
+        derivative: str | None = None,
+        sign: float = 1.0,
+        mean: Names | None = None,
+        signs: Vector | float = 1.0,
+        rollback: bool = True,
+    ) -> None:
         self.fmu, self._held, self._result, self._sign = fmu, held, result, sign
+        self._mean, self._signs = result if mean is None else mean, signs
         self._derivative = derivative if derivative in fmu.ports else None
+        self.rollback = rollback and fmu.can_rollback
         self._saved: ctypes.c_void_p | None = None
         self._moved = False
         self.solves = 0
 
     def begin(self) -> None:
         """Save the state that `solve` starts from."""
-        self._saved, self._moved = self.fmu.snapshot(), False
+        self._saved, self._moved = self.fmu.snapshot() if self.rollback else None, False
 
     def solve(self, time: float, step: float, held: Vector) -> Vector:
         """Step from `time` with `held` on the ports; the conjugate ports. Raises StepRejected, FmuFailed."""
@@ -110,16 +153,23 @@ class FmuEnd:
         self.solves += 1
         self.fmu.set(self._held, held)
         self.fmu.step(time, step, final=self._saved is None)
-        return self.fmu.get(self._result)
+        result = self.result()
+        if not np.isfinite(result).all():
+            raise StepFailed(f"{self.fmu.name}: step of {step:.6g} s at {time:.9g} s: answers with a number that is not finite")
+        return result
 
     def result(self) -> Vector:
         """The conjugate ports as they are."""
-        return self.fmu.get(self._result)
+        return self._signs * self.fmu.get(self._result)
+
+    def mean(self) -> Vector:
+        """The conjugate ports as means over the last step."""
+        return self._signs * self.fmu.get(self._mean)
 
     def derivative(self) -> Matrix | None:
         """d(result)/d(held) at the last solve, (n, n), if the FMU offers it."""
         if self._derivative is None:
-            return None
+            return np.reshape(self._signs, (-1, 1)) * self.fmu.derivatives(self._result, self._held) if self.fmu.has_derivatives else None
         values = self.fmu.get(self._derivative)
         return self._sign * values.reshape(-1, int(np.sqrt(values.size)))
 
@@ -136,11 +186,19 @@ class FmuEnd:
             self.commit()
 
 
-def impedance_end(fmu: Fmu, bond: Bond, derivative: str | None = "impedance") -> FmuEnd:
+def impedance_end(fmu: Fmu, bond: Bond, derivative: str | None = "impedance", rollback: bool = True) -> FmuEnd:
     """The end that takes flows and returns efforts; its `derivative` port is dF/dV with F = -effort."""
-    return FmuEnd(fmu, bond.flows, bond.efforts, derivative, -1.0)
+    return FmuEnd(fmu, bond.flow_inputs, bond.efforts, derivative, -1.0, signs=bond.signs, rollback=rollback)
 
 
-def mobility_end(fmu: Fmu, bond: Bond, derivative: str | None = "mobility") -> FmuEnd:
+def mobility_end(fmu: Fmu, bond: Bond, derivative: str | None = "mobility", rollback: bool = True) -> FmuEnd:
     """The end that takes efforts and returns flows; its `derivative` port is d(flow)/d(effort)."""
-    return FmuEnd(fmu, bond.efforts, bond.flows, derivative, 1.0)
+    return FmuEnd(fmu, bond.effort_inputs, bond.flows, derivative, 1.0, rollback=rollback)
+
+
+def end_value_ends(impedance: Fmu, mobility: Fmu, bond: Bond) -> tuple[FmuEnd, FmuEnd]:
+    """Both ends for a scheme that exchanges the values at the end of a step; their power is still that of the means."""
+    return (
+        FmuEnd(impedance, bond.flow_inputs, bond.end_efforts, mean=bond.efforts, signs=bond.signs),
+        FmuEnd(mobility, bond.effort_inputs, bond.end_flows, mean=bond.flows),
+    )

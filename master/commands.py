@@ -12,6 +12,7 @@ from typing import Any
 
 from master import scene as scenes_of
 from master.errors import UsageError
+from master.fmi.system import write_system
 from master.prepared import prepare
 
 Command = Callable[[argparse.Namespace], int]
@@ -30,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
 
 def statics(options: argparse.Namespace) -> int:
     """Print the coupled equilibrium of a scene."""
-    scene = scenes_of.load(options.scene, options.changes)
+    scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     from master.statics import report  # works with the units' packages, which a run never imports
 
     found = report(scene)
@@ -39,15 +40,18 @@ def statics(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write the FMUs of a scene into a folder."""
-    scene = scenes_of.load(options.scene, options.changes)
+    """Write the FMUs of a scene, and the files that connect them, into a folder."""
+    scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     folder = _folder(options.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryDirectory(dir=folder).cleanup()  # before the work, as a trial
     except OSError as error:
         raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-    for path in prepare(scene, ["--export", str(folder)]).fmus.values():
+    fmus = prepare(scene, ["--export", str(folder)]).fmus
+    simulation = scene.sections.simulation
+    joined = write_system(fmus, folder, simulation.macro_step, simulation.duration) if "vessel" in fmus else []
+    for path in (*fmus.values(), *joined):
         _say(str(path))
     return 0
 
@@ -59,6 +63,19 @@ def scenes(options: argparse.Namespace) -> int:
     for name, title in found.items():
         _say(f"{name:{width}}  {title}")
     return 0
+
+
+def stability(options: argparse.Namespace) -> int:
+    """Run the stability cases; exit code 1 where a limit is not kept."""
+    folder = _folder(options.output)
+    from master.stability.study import NAMES, study  # takes a second to import
+
+    for name in options.cases:
+        if name not in NAMES:
+            raise UsageError(f"case = {name!r}: must be one of {', '.join(NAMES)}")
+    text, kept = study(options.cases, folder, sys.stderr)
+    _say(f"{text}\ntables in {folder}")
+    return 0 if kept else 1
 
 
 def _folder(path: Path) -> Path:

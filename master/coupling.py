@@ -1,4 +1,4 @@
-"""One step of a power bond: energy-consistent iteration (EC-IJ), and the two explicit schemes to compare it with.
+"""One step of a power bond by energy-consistent iteration (EC-IJ), and the choice between the schemes.
 
 An impedance end answers the mean flow V over a step with the mean effort f, a mobility end answers f with V; each holds
 what it is given. The step is accepted when the bond makes no energy. With F = -f, Z = dF/dV >= 0 and Y = dV/df >= 0:
@@ -12,75 +12,27 @@ what it is given. The step is accepted when the bond makes no energy. With F = -
 Z and Y follow the ends' ports, where there are such, which makes the iteration Newton's; else Z follows Broyden's update,
 and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap. Where f is linear in V
 the second round is exact; with the extrapolated pair in place of a first solve, that makes two solves of the impedance
-end a step, or one where nothing happens. A rejected step is tried again with half the length.
+end a step, or one where nothing happens. A step that is not accepted, or that an FMU discards, is tried again with half the
+length, down to a smallest one; a step after which an FMU is in error or answers with NaN is tried again once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Protocol
-
 import numpy as np
 
 from .bond import Bond, Matrix, Vector
+from .explicit import Explicit
 from .extrapolation import Extrapolation
-from .fmu import FmuError, StepRejected
+from .fmu import StepFailed, StepRejected
+from .one_solve import OneSolve
+from .step import SLIVER, Check, Counters, CouplingFailed, End, Step, accept
+
+__all__ = ["Check", "CouplingFailed", "EnergyConsistent", "Explicit", "OneSolve", "Step", "coupling"]
 
 DIFFERENCES_ROUNDS = (4, 8)  # rounds after which Z is taken by differences: without ports, and with (one may be wrong)
 LAST_ROUND = 12
 EASY = 3  # rounds after which the step may grow
 SMALLEST_STEP = 2.0**-12  # of the macro step
-SLIVER = 1e-9  # of a step: a remainder that is round-off of the time
-
-
-class End(Protocol):
-    """One end of the bond, see `master.bond.FmuEnd`."""
-
-    solves: int
-
-    def begin(self) -> None: ...
-    def solve(self, time: float, step: float, held: Vector) -> Vector: ...
-    def result(self) -> Vector: ...
-    def derivative(self) -> Matrix | None: ...
-    def commit(self) -> None: ...
-    def cancel(self) -> None: ...
-
-
-@dataclass(frozen=True)
-class Step:
-    """An accepted step: its start, length, mean flow and effort (of the impedance end), bond residual [J], rounds."""
-
-    time: float
-    step: float
-    flow: Vector
-    effort: Vector
-    residual: float
-    rounds: int
-
-
-@dataclass
-class Counters:
-    """Work done so far."""
-
-    steps: int = 0
-    rejected_steps: int = 0
-    rounds: list[int] = field(default_factory=list)
-
-
-class CouplingFailed(FmuError):  # noqa: N818
-    """No agreement between the ends down to the smallest step; time [s], step [s], residual [J]."""
-
-    def __init__(self, time: float, step: float, residual: float, reason: str) -> None:
-        super().__init__(f"coupling failed at {time:.9g} s with a step of {step:.3g} s: {reason}")
-        self.time, self.step, self.residual = time, step, residual
-
-
-Check = Callable[[Step], bool]
-
-
-def _accept(step: Step) -> bool:
-    return True
 
 
 class EnergyConsistent:
@@ -89,8 +41,10 @@ class EnergyConsistent:
     `check` sees a step before it is committed (the ends' outputs are those of its end) and may send it back.
     """
 
+    words = "energy-consistent, iterated with rollback"
+
     def __init__(
-        self, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = _accept
+        self, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
     ) -> None:
         self.impedance, self.mobility, self.bond = impedance, mobility, bond
         self.macro_step, self.tolerance, self.check = macro_step, tolerance, check
@@ -110,6 +64,7 @@ class EnergyConsistent:
         step = min(self.wanted, limit)
         if limit - step < SLIVER * step:
             step = limit
+        failures = 0
         while True:
             residual, reason = float("nan"), "the check sent the step back"
             self.impedance.begin()
@@ -123,12 +78,13 @@ class EnergyConsistent:
                     residual = trial.residual
                     reason = f"bond residual {residual:.3g} J after {trial.rounds} rounds"
             except StepRejected as rejection:
+                failures += isinstance(rejection, StepFailed)
                 reason = str(rejection)
             self.impedance.cancel()
             self.mobility.cancel()
             self._length = 0.0
             self.counters.rejected_steps += 1
-            if step / 2 < SMALLEST_STEP * self.macro_step:
+            if failures > 1 or step / 2 < SMALLEST_STEP * self.macro_step:
                 raise CouplingFailed(time, step, residual, reason)
             step = self.wanted = step / 2
 
@@ -212,45 +168,20 @@ class EnergyConsistent:
             self._Z = self._Z + np.outer(d_force - self._Z @ d_flow, weighted) / size
 
 
-class Explicit:
-    """One solve of each end a step, no rollback: serial (Gauss-Seidel) or parallel (Jacobi) exchange.
-
-    Conditionally stable at best, and only with ends that exchange values at the end of the step; for comparison.
-    """
-
-    def __init__(self, impedance: End, mobility: End, bond: Bond, macro_step: float, serial: bool, check: Check = _accept) -> None:
-        self.impedance, self.mobility, self.bond = impedance, mobility, bond
-        self.macro_step, self.serial, self.check = macro_step, serial, check
-        self.counters = Counters()
-        self._flow, self._effort = mobility.result(), impedance.result()
-
-    def advance(self, time: float, limit: float) -> Step:
-        """One step from `time`, at most to `time` + `limit`. Raises CouplingFailed, FmuFailed."""
-        step = limit if limit < (1 + SLIVER) * self.macro_step else self.macro_step
-        try:
-            flow = self.mobility.solve(time, step, self._effort)
-            held = flow if self.serial else self._flow
-            effort = self.impedance.solve(time, step, held)
-        except StepRejected as rejection:
-            raise CouplingFailed(time, step, float("nan"), str(rejection)) from None
-        done = Step(time, step, flow, effort, step * float(self._effort @ flow - effort @ held), 1)
-        self._flow, self._effort = flow, effort
-        self.counters.steps += 1
-        self.counters.rounds.append(1)
-        if not self.check(done):
-            raise CouplingFailed(time, step, done.residual, "the check sent the step back")
-        return done
-
-
 SCHEMES = ("energy-consistent", "serial", "parallel")
 
 
 def coupling(
-    scheme: str, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = _accept
-) -> EnergyConsistent | Explicit:
-    """The coupling named `scheme`. Raises ValueError for a name that is not in SCHEMES."""
+    scheme: str, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
+) -> EnergyConsistent | OneSolve | Explicit:
+    """The coupling named `scheme`; the energy-consistent one with a single solve where an end cannot roll back.
+
+    Raises ValueError for a name that is not in SCHEMES.
+    """
     if scheme not in SCHEMES:
         raise ValueError(f"scheme = {scheme!r}: must be one of {', '.join(SCHEMES)}")
-    if scheme == "energy-consistent":
-        return EnergyConsistent(impedance, mobility, bond, macro_step, tolerance, check)
-    return Explicit(impedance, mobility, bond, macro_step, scheme == "serial", check)
+    if scheme != "energy-consistent":
+        return Explicit(impedance, mobility, bond, macro_step, scheme == "serial", check)
+    if not (impedance.rollback and mobility.rollback):
+        return OneSolve(impedance, mobility, bond, macro_step, check)
+    return EnergyConsistent(impedance, mobility, bond, macro_step, tolerance, check)

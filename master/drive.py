@@ -7,13 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from master.bond import hang_off, impedance_end, mobility_end
+from master.bond import end_value_ends, impedance_end, mobility_end
 from master.coupling import SMALLEST_STEP, Step, coupling
 from master.fmu import Fmu, Names, StepRejected
+from master.hang_off import hang_off
 from master.ledger import Columns, Ledger
 from master.prepared import Prepared
 from master.recorder import Source
@@ -46,8 +47,12 @@ class Drive(Protocol):
         """The FMUs by name."""
 
     @property
-    def effort(self) -> Effort:
-        """What it cost so far."""
+    def scheme(self) -> str:
+        """The coupling in words."""
+
+    @property
+    def effort(self) -> Any:
+        """What it cost so far, a dataclass of counts."""
 
     def advance(self, end: float) -> None:
         """Take one step, not beyond `end` [s]. Raises RunError, of which EnergyCheckFailed is one."""
@@ -64,11 +69,19 @@ class Coupled:
         self.time = 0.0
         self.units: Mapping[str, Fmu] = {"pipe": pipe, "vessel": vessel}
         self._clamped = sections.pipe.get("top") != "pinned"
-        self._pipe, self._vessel = impedance_end(pipe, bond), mobility_end(vessel, bond)
+        if rules.scheme == "energy-consistent":
+            self._pipe, self._vessel = impedance_end(pipe, bond, rollback=rules.rollback), mobility_end(vessel, bond)
+        else:
+            self._pipe, self._vessel = end_value_ends(pipe, vessel, bond)
         sources = [(pipe, columns(pipe, "top_work")), (vessel, columns(vessel, "bond_work"))]
         self.ledger = Ledger(sources, rules.energy_check, rules.on_violation)
         self._macro_step = sections.simulation.macro_step
         self._coupling = coupling(rules.scheme, self._pipe, self._vessel, bond, self._macro_step, rules.tolerance, self.ledger.check)
+
+    @property
+    def scheme(self) -> str:
+        """See `Drive`."""
+        return self._coupling.words
 
     @property
     def effort(self) -> Effort:
@@ -79,7 +92,7 @@ class Coupled:
     def advance(self, end: float) -> None:
         """See `Drive`."""
         step = self._coupling.advance(self.time, end - self.time)
-        self.time = _snapped(step.time + step.step, self._macro_step, end)
+        self.time = snapped(step.time + step.step, self._macro_step, end)
 
     def derived(self) -> Row:
         """See `Drive`."""
@@ -108,6 +121,8 @@ class Mover:
 class Prescribed:
     """The pipe alone; mean velocities over each step are the exact change of the top's position over its length."""
 
+    scheme = "the top is moved as prescribed"
+
     def __init__(self, pipe: Fmu, motion: TopMotion, sections: Sections) -> None:
         rules = sections.coupling
         self.time = 0.0
@@ -129,7 +144,7 @@ class Prescribed:
         while not self._attempt(step):
             self._rejected += 1
             step = self._wanted = step / 2
-        self.time = _snapped(self.time + step, self._macro_step, end)
+        self.time = snapped(self.time + step, self._macro_step, end)
         self._wanted = min(2.0 * self._wanted, self._macro_step)
         self._steps += 1
 
@@ -216,7 +231,7 @@ def pose_gap(pipe: Source, vessel: Source, clamped: bool = True) -> Row:
     return {("pose_gap", "m"): math.dist(held[:3], holding[:3])} | ({("pose_gap_angle", "rad"): angle} if clamped else {})
 
 
-def _snapped(time: float, step: float, end: float) -> float:
+def snapped(time: float, step: float, end: float) -> float:
     """`time`, or the multiple of `step` or the `end` that it misses by round-off only."""
     for exact in (end, round(time / step) * step):
         if abs(time - exact) < SNAP * step:

@@ -5,7 +5,8 @@ Lines differ in dash and marker as well as in colour, so that a grey print reads
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -132,24 +133,38 @@ def _draw_lines(axes: Any, time: np.ndarray, columns: dict[str, np.ndarray], uni
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, handlelength=2.6)
 
 
-def energy(path: Path, signals: Table) -> None:
-    """The energy balance: work supplied, energy stored (less that at the start), energy dissipated, and what is left.
+def _kind(name: str) -> str:
+    """What a column is by the ending of its name."""
+    if name in HANG_OFF:
+        return "bond"
+    return {"energy": "stored", "work": "supplied", "dissipation": "dissipated"}.get(name.rpartition("_")[2], "")
 
-    What is left comes with what the energy check allows of it at every instant.
+
+def energy(path: Path, signals: Table, kinds: Mapping[str, str]) -> None:
+    """The energy over time: exchanged through the bond, supplied, stored (less that at the start), dissipated, and what is left.
+
+    What is left, made by the interface among it, comes with what the energy check allows of it at every instant.
     """
     time = signals.column("time")
-    stored = {name.removesuffix("_energy"): c - c[0] for name, c in signals.ending("_energy").items()}
-    dissipated = {name.removesuffix("_dissipation"): c for name, c in signals.ending("_dissipation").items()}
-    works = {HANG_OFF.get(name, name).removesuffix("_work"): c for name, c in signals.ending("_work").items()}
-    with _figure(path, "Energy balance", (7.6, 8.0)) as figure:
-        panels = figure.subplots(4, 1, sharex=True)
-        titles = ("Work done on", "Stored", "Dissipated")
-        for axes, title, columns in zip(panels[:3], titles, (works, stored, dissipated), strict=True):
-            _draw_lines(axes, time, columns, 1e6)
-            axes.set(title=title, ylabel="Energy [MJ]")
+
+    def of(kind: str) -> dict[str, np.ndarray]:
+        found = {name: signals.column(name) for name in kinds if kinds[name] == kind}
+        return {re.sub("_(energy|work|dissipation)$", "", HANG_OFF.get(n, n)): column - column[0] for n, column in found.items()}
+
+    panels_of = {"Through the bond, work done on": of("bond"), "Supplied from outside": of("supplied")}
+    panels_of |= {"Stored": of("stored"), "Dissipated": of("dissipated")}
+    shown = {title: columns for title, columns in panels_of.items() if any(np.any(c) for c in columns.values())}
+    if not shown:
+        shown = {"Through the bond, exchanged": {"sum of amounts": signals.column("exchanged")}}
+    largest = max((float(np.abs(c).max()) for columns in shown.values() for c in columns.values()), default=0.0)
+    unit, symbol = next(((u, s) for u, s in ((1e6, "MJ"), (1e3, "kJ")) if largest >= u), (1.0, "J"))
+    with _figure(path, "Energy balance", (7.6, 1.8 * len(shown) + 2.4)) as figure:
+        *panels, residual = figure.subplots(len(shown) + 1, 1, sharex=True)
+        for axes, (title, columns) in zip(panels, shown.items(), strict=True):
+            _draw_lines(axes, time, columns, unit)
+            axes.set(title=title, ylabel=f"Energy [{symbol}]")
         made = np.cumsum(np.abs(signals.column("interface_residual")))
-        rest = {"interface_residual, summed": made, "closure": np.abs(signals.column("closure"))}
-        residual = panels[3]
+        rest = {"made by the interface": made, "closure of the ledger": np.abs(signals.column("closure"))}
         if "allowed" in signals:
             bound = signals.column("allowed")
             residual.plot(time, bound, color=ENVELOPE, linewidth=1.0)
@@ -160,8 +175,13 @@ def energy(path: Path, signals: Table) -> None:
         residual.set(title="Left over", ylabel="Energy [J]", xlabel="Time t [s]", yscale="log")
 
 
-def draw_all(folder: Path, signals: Table, shapes: Shapes | None, instants: Sequence[float]) -> list[Path]:
-    """Draw every figure that the recorded data allow into `folder`; return the files in order."""
+def draw_all(
+    folder: Path, signals: Table, shapes: Shapes | None, instants: Sequence[float], kinds: Mapping[str, str] | None = None
+) -> list[Path]:
+    """Draw every figure that the recorded data allow into `folder`; return the files in order.
+
+    `kinds` says which columns are stored, supplied, dissipated and bond; without it the endings of their names do.
+    """
     files = []
 
     def draw(name: str, function: Callable[..., None], *arguments: Any) -> None:
@@ -180,5 +200,5 @@ def draw_all(folder: Path, signals: Table, shapes: Shapes | None, instants: Sequ
         draw("fig7_shear_vectors.png", vectors, f"Figure 7   {shear}", n_labels, shapes, shapes.shear[-1])
         draw("fig8_bending.png", along, f"Figure 8   {bending}", "‖(m₂, m₃)‖ [kN m]", shapes, norm_moment, False)
         draw("fig9_shear.png", along, f"Figure 9   {shear}", "‖(n₂, n₃)‖ [kN]", shapes, norm_shear, False)
-    draw("energy.png", energy, signals)
+    draw("energy.png", energy, signals, {name: _kind(name) for name in signals.names} if kinds is None else kinds)
     return files

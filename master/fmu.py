@@ -27,7 +27,6 @@ from .errors import RunError
 from .port import Port, read_ports
 
 Names = str | tuple[str, ...]
-_DISCARD = 2
 _KEPT_MESSAGES = 20
 
 
@@ -39,8 +38,15 @@ class StepRejected(FmuError):  # noqa: N818
     """The FMU discarded a step (fmi2Discard): try again from a saved state with a shorter one."""
 
 
+class StepFailed(StepRejected):
+    """A step after which the FMU stands in error (fmi2Error) or answers with NaN: one more try from a saved state makes sense."""
+
+
 class FmuFailed(FmuError):  # noqa: N818
-    """The FMU cannot go on (fmi2Error, fmi2Fatal), or was asked for something it does not have."""
+    """The FMU cannot go on (fmi2Fatal, or an error outside a step), or was asked for something it does not have."""
+
+
+STEP_FAILURES = {2: StepRejected, 3: StepFailed}  # fmi2Discard, fmi2Error
 
 
 class _Channel(NamedTuple):
@@ -66,7 +72,10 @@ class Fmu:
             raise FmuFailed(f"{path}: not a readable FMU: {error}") from None
         self.name, self.guid = instance_name or model.modelName, model.guid
         self.ports = read_ports(model)
+        if model.coSimulation is None or not model.fmiVersion.startswith("2."):
+            raise FmuFailed(f"{path}: not an FMU for co-simulation by FMI 2.0")
         self.can_rollback = bool(model.coSimulation.canGetAndSetFMUstate)
+        self.has_derivatives = bool(model.coSimulation.providesDirectionalDerivative)
         self.can_serialize = bool(model.coSimulation.canSerializeFMUstate)
         self.can_vary_step = bool(model.coSimulation.canHandleVariableCommunicationStepSize)
         folder = tempfile.TemporaryDirectory(prefix="fmu_")
@@ -136,6 +145,12 @@ class Fmu:
         if self._set_real(self._component, channel.references, channel.size, channel.pointer) > 1:
             raise self._failure(f"set {names}")
 
+    def derivatives(self, results: Names, held: Names) -> NDArray[np.float64]:
+        """d(results)/d(held) by the FMU's directional derivatives, one call a column."""
+        unknown, known = (list(self._channel(names).references) for names in (results, held))
+        columns = [self._call("directional derivative", self._fmu.getDirectionalDerivative, unknown, [one], [1.0]) for one in known]
+        return np.array(columns).T
+
     def names(self, causality: str) -> list[str]:
         """Names of the ports with this causality: input, output, parameter."""
         return [port.name for port in self.ports.values() if port.causality == causality]
@@ -156,7 +171,7 @@ class Fmu:
         """
         status = self._do_step(self._component, ctypes.c_double(time), ctypes.c_double(step), final)
         if status > 1:
-            raise self._failure(f"step of {step:.6g} s at {time:.9g} s", StepRejected if status == _DISCARD else FmuFailed)
+            raise self._failure(f"step of {step:.6g} s at {time:.9g} s", STEP_FAILURES.get(status, FmuFailed))
 
     def snapshot(self) -> ctypes.c_void_p:
         """A handle to the FMU's whole state, for `restore`; freed by `release` or `close`."""

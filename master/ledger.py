@@ -11,7 +11,7 @@ flipped sign or a wrong axis of a port leaves every FMU's own identity intact, a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -24,6 +24,7 @@ from .errors import RunError
 ROUND_OFF = 1e-12  # of the largest energy, work or dissipation: what differences of large sums may lose
 REFINEMENTS = 8  # times one step may be sent back before the check fails
 
+Idle = Callable[[NDArray[Any]], float]
 Action = Literal["stop", "refine", "warn"]
 
 
@@ -62,6 +63,10 @@ class _Account:
         if columns.bond is not None:
             kept.append((columns.bond, 0.0))
         self.fmu, self.names = fmu, tuple(name for name, _ in kept)
+        kinds = zip(("stored", "supplied", "dissipated"), (columns.energy, columns.work, columns.dissipation), strict=True)
+        self.kinds = [(name, kind) for kind, names in kinds for name in names if name in fmu.ports]
+        if columns.bond is not None:
+            self.kinds.append((columns.bond, "bond"))
         self.signs = np.array([sign for _, sign in kept])
         self.has_bond = columns.bond is not None
         self.start = self.last = self.now = fmu.get(self.names)
@@ -96,11 +101,14 @@ class Ledger:
     `tolerance` is the closure error allowed, relative to the energy exchanged so far: the sum of |dB| of the first FMU
     (of a single FMU without a bond: of the largest change of any column); to it comes ROUND_OFF of the largest column.
     `action` on a violation: "stop" raises EnergyCheckFailed, "refine" sends the step back to be halved and stops when
-    that does not help, "warn" keeps the first complaint and goes on.
+    that does not help, "warn" keeps the first complaint and goes on. Without sources, where no FMU reports energies, the
+    check is the bond's residual alone, summed with its sign; `idle` is then the power [W] that counts as nothing.
     """
 
-    def __init__(self, sources: Sequence[tuple[Source, Columns]], tolerance: float = 1e-8, action: Action = "stop") -> None:
-        self.tolerance, self.action = tolerance, action
+    def __init__(
+        self, sources: Sequence[tuple[Source, Columns]], tolerance: float = 1e-8, action: Action = "stop", idle: Idle | None = None
+    ) -> None:
+        self.tolerance, self.action, self._idle = tolerance, action, idle
         self._accounts = [_Account(fmu, columns) for fmu, columns in sources]
         self._refused = 0
         self.exchanged = 0.0  # running totals [J]; the interface residual adds up absolute values
@@ -114,17 +122,25 @@ class Ledger:
     def names(self) -> list[str]:
         """Names of `row`: every column with its FMU, then the totals [J]."""
         columns = [f"{account.fmu.name}.{name}" for account in self._accounts for name in account.names]
-        return [*columns, "interface_residual", "closure", "exchanged", "allowed"]
+        return [*columns, "interface_residual", "interface_residual_sum", "closure", "exchanged", "allowed"]
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """What the columns of the FMUs are: stored, supplied, dissipated, bond."""
+        return {f"{account.fmu.name}.{name}": kind for account in self._accounts for name, kind in account.kinds}
 
     @property
     def row(self) -> list[float]:
-        """The columns after the last step, the residual of that step, running closure, exchanged energy and what is allowed [J]."""
-        columns = np.concatenate([account.last for account in self._accounts]).tolist()
-        return [*columns, self.step_residual, self.closure, self.exchanged, self.allowed]
+        """The columns after the last step, the residual of that step, its running sum, closure, exchanged energy, what is allowed [J]."""
+        columns = [value for account in self._accounts for value in account.last.tolist()]
+        return [*columns, self.step_residual, self.interface_residual, self.closure, self.exchanged, self.allowed]
 
     def check(self, step: Step) -> bool:
         """Read all FMUs and judge the step; False sends it back. Raises EnergyCheckFailed."""
-        return self.record(step.time + step.step)
+        if self._accounts:
+            return self.record(step.time + step.step)
+        moved = step.step * max(abs(float(step.effort @ step.flow)), self._idle(step.effort) if self._idle else 0.0)
+        return self._judge(step.time + step.step, self.exchanged + moved, self.closure + step.residual, step.residual)
 
     def record(self, time: float) -> bool:
         """As `check`, for a step that ended at `time`."""
@@ -134,6 +150,10 @@ class Ledger:
         exchanged = self.exchanged + accounts[0].moved
         closure = sum(account.closure for account in accounts)
         residual = sum(account.bond for account in accounts) if len(accounts) > 1 else 0.0
+        return self._judge(time, exchanged, closure, residual)
+
+    def _judge(self, time: float, exchanged: float, closure: float, residual: float) -> bool:
+        accounts = self._accounts
         largest = max(self.largest, self._largest())
         allowed = self.tolerance * exchanged + ROUND_OFF * largest
         # the residual of the bond is inside the closure; judged by itself too, so that no other error can hide it
@@ -164,6 +184,8 @@ class Ledger:
             f"{self.exchanged:.3g} J exchanged and {ROUND_OFF:.0e} of the largest column, {self.largest:.3g} J); "
             f"the bond made {self.interface_residual:.2g} J"
         )
+        if not self._accounts:
+            figures += "; the units report no energies, so this is the bond's own residual alone"
         if self.complaint:
             return f"energy check failed: {figures}; first {self.complaint.removeprefix('energy check ')}"
         return f"energy check passed: {figures}"
@@ -175,6 +197,7 @@ class Ledger:
     def _sent_back(self, time: float, closure: float, residual: float, exchanged: float, allowed: float) -> bool:
         """Deal with a violation; True if the step is to be repeated."""
         own = [f"{account.fmu.name}'s own balance is off by {account.balance:.2g} J" for account in self._accounts]
+        own = own or ["the units report no energies"]
         text = (
             f"energy check failed at {time:.9g} s: closure error {closure:.3g} J of {exchanged:.3g} J exchanged "
             f"(allowed {allowed:.3g} J); in this step the bond made {residual:.3g} J, {', '.join(own)}"

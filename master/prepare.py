@@ -35,7 +35,7 @@ def prepare(mapping: dict[str, Any], folder: Path | None) -> dict[str, Any]:
         package = Path(vessel_fmu.__file__).parent
         recipes["vessel"] = Recipe(package, "slave.VesselUnit", to_mapping(at.vessel), experiment=experiment)
     fmus = {
-        name: cached_fmu(recipe, _cache()) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
+        name: cached_fmu(recipe, fmu_folder()) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
         for name, recipe in recipes.items()
     }
     equilibrium: dict[str, Any] = {"top_force_e_N": rest.found.top[:3].tolist(), "top_moment_e_N_m": rest.found.top[3:].tolist()}
@@ -48,7 +48,8 @@ def prepare(mapping: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     }
 
 
-def _cache() -> Path:
+def fmu_folder() -> Path:
+    """Where FMUs are kept by content. Raises RunError."""
     chosen = os.environ.get("PIPELAY_CACHE")
     for place in (Path(chosen) if chosen else Path.home() / ".cache" / "pipelay", Path(tempfile.gettempdir()) / "pipelay"):
         try:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TextIO
 
 import numpy as np
 
@@ -66,6 +66,11 @@ SIGNALS = (
 """Columns of signals.csv between the time and the ledger; top_force, top_moment: the pull of the pipe on the vessel."""
 
 
+def csv_line(row: Sequence[float]) -> str:
+    """Numbers as they read back to the same bits."""
+    return ",".join(map(repr, row))
+
+
 @dataclass(frozen=True)
 class Table:
     """Recorded signals: `values[i, j]` is column j (`names[j]`, in `units[j]`) after step i; row 0 is the start."""
@@ -89,11 +94,14 @@ class Table:
         """Every column whose name ends in `suffix`."""
         return {name: self.column(name) for name in self.names if name.endswith(suffix)}
 
+    @property
+    def header(self) -> str:
+        """First line of the CSV file."""
+        return ",".join(f"{name} [{unit}]" for name, unit in zip(self.names, self.units, strict=True))
+
     def write(self, path: Path) -> None:
         """Write as CSV; numbers are printed so that they read back to the same bits."""
-        header = ",".join(f"{name} [{unit}]" for name, unit in zip(self.names, self.units, strict=True))
-        lines = (",".join(map(repr, row)) for row in self.values.tolist())
-        path.write_text("\n".join([header, *lines, ""]), encoding="utf-8")
+        path.write_text("\n".join([self.header, *map(csv_line, self.values.tolist()), ""]), encoding="utf-8")
 
 
 @dataclass(frozen=True)
@@ -124,15 +132,22 @@ class Shapes:
 class Recorder:
     """Collects signals after every step and shapes at multiples of `recording_step` and at the `snapshots`.
 
-    `sources` maps unit names ("pipe", "vessel") to their ports. `recording_step` None keeps no shapes at all.
+    `sources` maps unit names ("pipe", "vessel") to their ports; `signals` are listed unit by unit. `recording_step` None
+    keeps no shapes at all. Rows also go to `stream` as they come, so that they outlive a process that an FMU kills.
     """
 
     def __init__(
-        self, sources: Mapping[str, Source], recording_step: float | None, snapshots: Sequence[float] = ()
+        self,
+        sources: Mapping[str, Source],
+        recording_step: float | None,
+        snapshots: Sequence[float] = (),
+        signals: Sequence[Signal] = SIGNALS,
+        stream: TextIO | None = None,
     ) -> None:
-        self._sources = sources
-        self._signals = [s for s in SIGNALS if s.unit in sources and s.port in sources[s.unit].ports]
-        ports = {unit: tuple(s.port for s in self._signals if s.unit == unit) for unit in ("vessel", "pipe")}
+        self._sources, self._stream = sources, stream
+        self._signals = [s for s in signals if s.unit in sources and s.port in sources[s.unit].ports]
+        units = dict.fromkeys(s.unit for s in self._signals)
+        ports = {unit: tuple(s.port for s in self._signals if s.unit == unit) for unit in units}
         self._requests = [(sources[unit], names) for unit, names in ports.items() if names]
         self._recording_step = recording_step if "pipe" in sources else None
         self._snapshots = sorted(snapshots)
@@ -147,11 +162,16 @@ class Recorder:
         """Record the units as they stand at `time`; `extra` maps (name, unit) to further values, always the same."""
         if not self._rows:
             self._extra = tuple(extra)
+            if self._stream is not None:
+                self._stream.write(self.table().header + "\n")
         row = [time]
         for source, names in self._requests:
             row.extend(source.get(names).tolist())
         row.extend(float(extra[key]) for key in self._extra)
         self._rows.append(row)
+        if self._stream is not None:
+            self._stream.write(csv_line(row) + "\n")
+            self._stream.flush()
         if self._recording_step is not None and time >= self._next_shape - TIME_ROUNDING:
             self.record_shape(time)
 

@@ -34,14 +34,15 @@ def summarise(run: Mapping[str, Any], signals: Table) -> dict[str, Any]:
         }
     if "pose_gap_angle" in signals:
         summary["pose_gap_rad"] = _largest(signals, "pose_gap_angle")
-    summary |= {
-        "top_tension_max_N": _largest(signals, "top_tension"),
-        "top_tension_min_N": float(signals.column("top_tension").min()),
-        "bending_moment_max_N_m": _largest(signals, "largest_bending_moment"),
-        "von_mises_max_Pa": _largest(signals, "largest_von_mises"),
-        "pipe_length_m": _last(signals, "pipe_length")[0],
-    }
-    summary["stretch_m"] = summary["pipe_length_m"] - run["unstretched_length_m"]
+    if "top_tension" in signals:
+        summary |= {
+            "top_tension_max_N": _largest(signals, "top_tension"),
+            "top_tension_min_N": float(signals.column("top_tension").min()),
+            "bending_moment_max_N_m": _largest(signals, "largest_bending_moment"),
+            "von_mises_max_Pa": _largest(signals, "largest_von_mises"),
+            "pipe_length_m": _last(signals, "pipe_length")[0],
+        }
+        summary["stretch_m"] = summary["pipe_length_m"] - run["unstretched_length_m"]
     return {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in summary.items()}
 
 
@@ -65,13 +66,15 @@ def screen(summary: Mapping[str, Any], title: str) -> str:
             ("vessel at the end", place),
             ("largest pose gap", f"{summary['pose_gap_m']:.1e} m" + (f", {angle:.1e} rad" if angle is not None else "")),
         ]
-    low, high = summary["top_tension_min_N"] / 1e3, summary["top_tension_max_N"] / 1e3
-    bending, stress = summary["bending_moment_max_N_m"] / 1e3, summary["von_mises_max_Pa"] / 1e6
-    rows += [
-        ("top tension", f"{low:.2f} to {high:.2f} kN"),
-        ("largest bending", f"{bending:.2f} kN m, von Mises stress {stress:.1f} MPa"),
-        ("pipe length", f"{summary['pipe_length_m']:.4f} m at the end"),
-        ("energy check", summary["energy_check"].removeprefix("energy check ")),
-    ]
+    if "top_tension_min_N" in summary:
+        low, high = summary["top_tension_min_N"] / 1e3, summary["top_tension_max_N"] / 1e3
+        bending, stress = summary["bending_moment_max_N_m"] / 1e3, summary["von_mises_max_Pa"] / 1e6
+        rows += [
+            ("top tension", f"{low:.2f} to {high:.2f} kN"),
+            ("largest bending", f"{bending:.2f} kN m, von Mises stress {stress:.1f} MPa"),
+            ("pipe length", f"{summary['pipe_length_m']:.4f} m at the end"),
+        ]
+    left = f"the bond made {summary['interface_residual_J']:.2g} J of {summary['exchanged_energy_J']:.3g} J exchanged"
+    rows += [("coupling", f"{summary['coupling']}; {left}"), ("energy check", summary["energy_check"].removeprefix("energy check "))]
     width = max(len(name) for name, _ in rows)
     return "\n".join([f"{summary['scene']}: {title}", *(f"  {name:{width}}  {text}" for name, text in rows)])

@@ -1,6 +1,7 @@
 """A run from the scene to the files: prepare, load the FMUs, step to the end, write what was recorded.
 
-Whatever ends a run early, a failed step, a broken energy balance or Ctrl-C, the results up to there are written.
+Whatever ends a run early, a failed step, a broken energy balance or Ctrl-C, the results up to there are written. The signals
+are written as they come: even where an FMU takes the process with it, signals.csv has every step before.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import shutil
 import tempfile
 import threading
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,13 +19,15 @@ from typing import Any, TextIO
 from tqdm import tqdm
 
 from master import figures, report
+from master.bonded import open_bonded, signals
 from master.drive import Drive, open_drive
 from master.errors import RunError, UsageError
 from master.interrupts import postponed
 from master.ledger import EnergyCheckFailed
 from master.prepared import prepare
-from master.recorder import Recorder
+from master.recorder import SIGNALS, Recorder, Signal
 from master.scene import Scene
+from master.units import General
 
 OWN_FILES = ("signals.csv", "shapes.npz", "summary.json", "energy.png", "fig[3-9]_*.png")
 SLOW = 8.0  # s without a sign of life before a word about compiling
@@ -47,30 +50,30 @@ class Ending:
     message: str = ""
 
 
-def simulate(scene: Scene, folder: Path, stream: TextIO) -> Result:
-    """Run a scene and leave its results in `folder`; progress goes to `stream`, to a terminal only.
+def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
+    """Run a scene and leave its results in `folder`; progress goes to `screen`, to a terminal only.
 
     Raises UsageError where the scene or the folder cannot be used, RunError where the run could not even start.
     """
     with _scratch_folder(folder) as scratch:
         with ExitStack() as stack:
             begun = clock.perf_counter()
-            patience = _patience(stream)
+            patience = _patience(screen)
             stack.callback(patience.cancel)
-            prepared = prepare(scene)
-            drive = stack.enter_context(open_drive(scene.sections, prepared))
-            simulation = scene.sections.simulation
-            length = float(drive.units["pipe"].get("s")[-1])
-            recorder = Recorder(drive.units, simulation.recording_step, simulation.snapshots)
+            simulation, drive, kept = scene.sections.simulation, *_open(scene, stack)
+            _clear(folder)
+            stream = stack.enter_context((folder / "signals.csv").open("w", encoding="utf-8"))
+            recorder = Recorder(drive.units, simulation.recording_step, simulation.snapshots, kept, stream)
             started = clock.perf_counter()
-            ending = _march(drive, recorder, scene, stream, patience)
+            ending = _march(drive, recorder, scene, screen, patience)
             wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
-            if ending.status in ("completed", "interrupted"):  # else the FMUs may stand in the middle of a step
+            if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
                 recorder.record_shape(drive.time)
-            account = {"unstretched_length_m": length, **asdict(ending), **asdict(drive.effort), **wall, **drive.ledger.summary()}
+            account = {"coupling": drive.scheme, **_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
+            account |= drive.ledger.summary()
             account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}
             account |= {"energy_check": ending.message if ending.status == "stopped" else drive.ledger.verdict()}
-        result = _write(scene, recorder, account, scratch)
+            result = _write(scene, recorder, account, scratch, drive.ledger.kinds)
         _move_into_place(scratch, folder)
     return result
 
@@ -101,26 +104,43 @@ def _row(drive: Drive) -> dict[tuple[str, str], float]:
     return drive.derived() | {(name, "J"): value for name, value in zip(drive.ledger.names, drive.ledger.row, strict=True)}
 
 
-def _write(scene: Scene, recorder: Recorder, account: dict[str, Any], folder: Path) -> Result:
+def _open(scene: Scene, stack: ExitStack) -> tuple[Drive, Sequence[Signal]]:
+    """The units of a scene, initialised, and the signals to keep."""
+    if isinstance(scene.sections, General):
+        units = stack.enter_context(open_bonded(scene.sections))
+        return units, signals(scene.sections, units.units)
+    return stack.enter_context(open_drive(scene.sections, prepare(scene))), SIGNALS
+
+
+def _facts(drive: Drive) -> dict[str, float]:
+    """What the report needs of the units beside the signals."""
+    pipe = drive.units.get("pipe")
+    return {"unstretched_length_m": float(pipe.get("s")[-1])} if pipe is not None and "s" in pipe.ports else {}
+
+
+def _write(scene: Scene, recorder: Recorder, account: dict[str, Any], folder: Path, kinds: dict[str, str]) -> Result:
     """Write every file of the results into `folder`."""
-    signals, shapes = recorder.table(), recorder.shapes()
-    summary = report.summarise({"scene": scene.name, **account}, signals)
-    signals.write(folder / "signals.csv")
+    table, shapes = recorder.table(), recorder.shapes()
+    summary = report.summarise({"scene": scene.name, **account}, table)
     if shapes is not None:
         shapes.write(folder / "shapes.npz")
-    instants = [t for t in scene.sections.simulation.snapshots if t <= signals.column("time")[-1]]
-    figures.draw_all(folder, signals, shapes, instants)
+    instants = [t for t in scene.sections.simulation.snapshots if t <= table.column("time")[-1]]
+    figures.draw_all(folder, table, shapes, instants, kinds)
     report.write_summary(folder / "summary.json", summary)
     passed = summary["status"] == "completed" and summary["energy_check_passed"]
     return Result(passed, summary, report.screen(summary, scene.sections.title))
 
 
-def _move_into_place(scratch: Path, folder: Path) -> None:
-    """Replace the results of an earlier run in `folder` by those in `scratch`; other files there stay."""
+def _clear(folder: Path) -> None:
+    """Make the folder, or remove the results of an earlier run from it; other files there stay."""
     folder.mkdir(parents=True, exist_ok=True)
     for pattern in OWN_FILES:
         for old in folder.glob(pattern):
             old.unlink()
+
+
+def _move_into_place(scratch: Path, folder: Path) -> None:
+    """The finished files join the signals."""
     for new in sorted(scratch.iterdir()):
         shutil.move(new, folder / new.name)
 

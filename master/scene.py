@@ -17,6 +17,7 @@ from typing import Any
 from master.errors import UsageError
 from master.fmi.schema import build
 from master.sections import Coupling, Simulation, Start, Tables, TopMotion
+from master.units import General, general
 
 BUILT_IN = resources.files("master") / "scenes"
 UNIT_TABLES = ("environment", "pipe", "vessel")
@@ -79,7 +80,7 @@ class Scene:
     """A scene by name, its checked sections, and the plain mapping that it came from."""
 
     name: str
-    sections: Sections
+    sections: Any  # Sections of pipe and vessel, or General of any two FMUs
     mapping: dict[str, Any]
 
 
@@ -98,11 +99,16 @@ def load(name: str, changes: Iterable[str] = ()) -> Scene:
     mapping = _parse(name, _read(name, path))
     for change in changes:
         _merge(mapping, _parse_change(change), change)
-    return from_mapping(mapping, path.stem)
+    return from_mapping(mapping, path.stem, path.parent)
 
 
-def from_mapping(mapping: dict[str, Any], name: str) -> Scene:
-    """The scene of a nested mapping as TOML gives it. Raises SceneError."""
+def from_mapping(mapping: dict[str, Any], name: str, folder: Path = Path()) -> Scene:
+    """The scene of a nested mapping as TOML gives it; [units] makes it one of any two FMUs, sought in `folder`. Raises SceneError."""
+    if "units" in mapping:
+        try:
+            return Scene(name, general(mapping, folder), mapping)
+        except ValueError as error:
+            raise SceneError(str(error)) from None
     for key in UNIT_TABLES:
         if not isinstance(mapping.get(key, {}), dict):
             raise SceneError(f"{key} = {mapping[key]!r}: must be a table")
@@ -168,3 +174,10 @@ def _merge(mapping: dict[str, Any], change: Mapping[str, Any], source: str, path
             _merge(mapping[key], value, source, where)
         else:
             raise SceneError(f"--set {source}: {where} = {mapping[key]!r} is no table that could hold a key")
+
+
+def of_pipe(scene: Scene) -> Scene:
+    """The scene, if it has a pipe. Raises SceneError."""
+    if isinstance(scene.sections, General):
+        raise SceneError(f"scene = {scene.name!r}: is of FMUs given as files; this command needs one with [pipe]")
+    return scene

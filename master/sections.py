@@ -64,6 +64,12 @@ class Coupling(Section):
     tolerance: float = _number("energy the bond may make in a step, relative", "1", above=0.0, below=1.0, default=1e-9)
     energy_check: float = _number("limit of residual and closure over the energy exchanged", "1", above=0.0, default=1e-8)
     on_violation: Literal["stop", "refine", "warn"] = "stop"
+    rollback: bool = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.on_violation == "refine" and not (self.rollback and self.scheme == "energy-consistent"):
+            raise ValueError("on_violation = 'refine': must be stop or warn where a step is not repeated")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from .node_kernel import advance
 from .step_kernel import element_strains
 
 MAX_CORRECTIONS = 25
+CAREFUL_CORRECTIONS = 100
 WORKS = ("drag", "current", "rotational", "internal", "contact", "numerical")
 
 
@@ -59,9 +60,10 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     top = h * np.concatenate([velocity, spin])
     old = state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain
     spent = 0
-    for guess in (2.0 * state.last - state.before, state.last, np.zeros_like(state.last)):
+    for guess, careful in ((2.0 * state.last - state.before, False), (state.last, True), (np.zeros_like(state.last), True)):
+        limit = CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
         converged, x, strain, force, tangent, works, iterations, residual = solve_step(
-            line, water, h, *old, h * guess, top, MAX_CORRECTIONS
+            line, water, h, *old, h * guess, top, careful, limit
         )
         spent += iterations
         if converged:

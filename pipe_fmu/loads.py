@@ -137,13 +137,14 @@ def add_contact(h, diameter, weight, z1, z2, sag, sag_row, vector, matrix):
 
 
 @kernel
-def add_mean_contact(h, dt, diameter, weight, bed, old, new, ends, mean_row, new_row, fresh, vector, matrix):
+def add_mean_contact(h, dt, diameter, weight, bed, old, new, ends, mean_row, new_row, fresh, sharp, vector, matrix):
     """Reaction of the bed over a step: discrete gradient of the potential, damping and friction.
 
     `old`, `new` (3,): z of the two nodes and sag before and after; `ends` (2, 6) mean velocities; `mean_row`, `new_row` (9,) gradients
     of the sag, averaged over the step and at its end; `bed` = (damping [s/m], friction, friction speed [m/s]). The dashpot's force is
     damping * z' times the elastic force: it acts in contact only, and at most takes that force away. Friction is Coulomb's, regularised.
-    Tangent if `fresh`. Returns the work dissipated [J].
+    Tangent if `fresh`; that of friction is Newton's if `sharp`, else one that never underrates it, with which no correction overshoots.
+    Returns the work dissipated [J].
     """
     dissipated = 0.0
     row = np.empty(12)
@@ -179,17 +180,24 @@ def add_mean_contact(h, dt, diameter, weight, bed, old, new, ends, mean_row, new
             vx = y * ends[0, 0] + x * ends[1, 0]
             vy = y * ends[0, 1] + x * ends[1, 1]
             speed = math.sqrt(vx * vx + vy * vy + bed[2] * bed[2])
-            f = share * bed[1] * force / speed
+            grip = share * bed[1] / speed
+            f = grip * force
             dissipated += f * (vx * vx + vy * vy) * dt
+            bent = 1.0 / (speed * speed) if sharp else 0.0
             for i in range(2):
                 v_i = vx if i == 0 else vy
                 vector[i] += y * f * v_i
                 vector[6 + i] += x * f * v_i
                 for j in range(2 if fresh else 0):
                     v_j = vx if j == 0 else vy
-                    k_ij = f / dt * ((1.0 if i == j else 0.0) - v_i * v_j / (speed * speed))
+                    k_ij = f / dt * ((1.0 if i == j else 0.0) - v_i * v_j * bent)
                     matrix[i, j] += y * y * k_ij
                     matrix[i, 6 + j] += x * y * k_ij
                     matrix[6 + i, j] += x * y * k_ij
                     matrix[6 + i, 6 + j] += x * x * k_ij
+                if fresh and sharp:
+                    for j in range(12):
+                        pressed = grip * v_i * slope * row_new[j]
+                        matrix[i, j] += y * pressed
+                        matrix[6 + i, j] += x * pressed
     return dissipated

@@ -13,6 +13,8 @@ TOLERANCE = 1e-11  # of the largest element force (moment): well below any coupl
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
 NEAR = 1e-5  # residual from which on a tangent is kept
 SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
+SHARP = 1e-3  # residual below which a careful search takes Newton's tangent of friction
+LEAST_SHARE = 0.02  # of a correction: a careful search halves no further
 LOST = 1e12  # residual from which there is no way back
 
 
@@ -130,16 +132,18 @@ def _size(residual, force_scale, moment_scale, top_clamped):
 
 
 @kernel
-def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, limit):
+def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, careful, limit):
     """Increments (n, 6) of one step with the top's increment `top` (6,) prescribed, from `guess` (n, 6), in at most `limit` corrections.
 
     The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
-    is made anew for every further one. Returns (converged, x, new_strain, top force (6,) on the pipe, condensed tangent (6, 6), works (6,),
-    corrections, residual).
+    is made anew for every further one. A `careful` search makes it anew always, starts with a tangent of friction with which nothing
+    overshoots, and halves a correction that does not lower the residual. Returns (converged, x, new_strain, top force (6,) on the pipe,
+    condensed tangent (6, 6), works (6,), corrections, residual).
     """
     n = guess.shape[0]
     system = (np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6)))
     diagonal, lower, upper, residual = system
+    old = (position, quaternion, velocity, rate, flow, strain)
     pivots = np.empty((n - 1, SIZE), np.int64)
     x = guess.copy()
     correction = np.empty((n, SIZE))
@@ -148,11 +152,11 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
     tangent = np.zeros((6, 6))
     force, wanted, move = np.empty(6), np.empty(6), np.empty(6)
     previous, size = math.inf, math.inf
+    share, lowest = 1.0, math.inf
     fresh, keep = True, True
     for iteration in range(limit + 1):
-        force_scale, moment_scale = step_system(
-            line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, system, works
-        )
+        sharp = not careful or size < SHARP
+        force_scale, moment_scale = step_system(line, water, h, *old, x, new_strain, fresh, sharp, system, works)
         gap = 0.0
         for i in range(SIZE):
             force[i] = residual[n - 1, i]
@@ -164,6 +168,11 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
         done = gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous))
         if done and iteration > 0:
             return True, x, new_strain, force, tangent, works, iteration, size
+        if careful and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
+            share *= 0.5
+            _move(x, -share, correction)
+            continue
+        share, lowest = 1.0, size * force_scale
         if not size < LOST or iteration == limit:
             break
         if fresh:
@@ -176,16 +185,22 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             continue
         if done:
             return True, x, new_strain, force, tangent, works, iteration, size
-        fresh = not keep
+        fresh = careful or not keep
         condense(diagonal, lower, pivots, residual)
         if not top_correction(line, diagonal[n - 1], residual[n - 1], wanted, move):
             break
         substitute(upper, residual, move, correction)
-        for k in range(n):
-            for i in range(SIZE):
-                x[k, i] += correction[k, i]
+        _move(x, 1.0, correction)
         for i in range(SIZE):
             if line.top_clamped or i < 3:
                 x[n - 1, i] = top[i]
         previous = size
     return False, x, new_strain, force, tangent, works, limit, size
+
+
+@kernel
+def _move(x, share, correction):
+    """x += share * correction."""
+    for k in range(x.shape[0]):
+        for i in range(SIZE):
+            x[k, i] += share * correction[k, i]

@@ -32,15 +32,24 @@ def contact(z, diameter, weight):
 
 @kernel
 def mean_contact(z_old, z_new, diameter, weight):
-    """Discrete gradient of the potential between two positions: mean force (upward) and its derivative with respect to z_new.
+    """Mean of the force over the way from one position to another, a discrete gradient, and its derivative with respect to z_new.
 
-    force * (z_new - z_old) is the potential's increase exactly.
+    force * (z_new - z_old) is the potential's increase exactly: on each of its three pieces the law is a parabola, of which Simpson's
+    rule takes the mean without the cancellation of a difference of potentials.
     """
-    u_old = contact(z_old, diameter, weight)[0]
-    u_new, f_new, _ = contact(z_new, diameter, weight)
     step = z_new - z_old
-    if math.fabs(step) < 1e-6 * diameter:
-        _, force, k = contact(0.5 * (z_old + z_new), diameter, weight)
+    if step == 0.0:
+        _, force, k = contact(z_old, diameter, weight)
         return force, 0.5 * k
-    mean = (u_new - u_old) / step
-    return mean, (f_new - mean) / step
+    low, high = min(z_old, z_new), max(z_old, z_new)
+    mean, start = 0.0, -0.125 * diameter
+    for end in (-0.075 * diameter, math.inf):
+        a, b = max(low, start), min(high, end)
+        if b > a:
+            ends = contact(a, diameter, weight)[1] + contact(b, diameter, weight)[1]
+            mean += (b - a) / (high - low) * (ends + 4.0 * contact(0.5 * (a + b), diameter, weight)[1]) / 6.0
+        start = end
+    _, force, k = contact(z_new, diameter, weight)
+    if math.fabs(step) < 1e-6 * diameter:
+        return mean, 0.5 * k
+    return mean, (force - mean) / step

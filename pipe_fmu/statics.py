@@ -15,6 +15,7 @@ from .compiled import kernel
 from .line import Array, Line, Water
 from .newton import LOST, condense_top, hold_foot, hold_foot_residual, top_correction
 from .so3 import conjugate, exp, log, multiply, normalize, scale
+from .stability import positive
 from .static_kernel import spin, static_system
 
 TOLERANCE = 1e-11  # of the line's weight (times its longest element, for moments)
@@ -23,6 +24,9 @@ _FREE_CORRECTIONS = 60
 _LARGEST_TURN = 0.25  # rad of one correction
 _LEAST_DAMPING = 1e-3  # of the scales, per metre and radian
 _MOST_DAMPING = 1e9
+_STALLED = 1e3  # damping at which a residual of round-off no longer falls
+_HAULED_FROM = 0.9  # of the taut distance
+_HAULS = 8  # steps at least in which the top is hauled in
 _TURN_OF_TOP = 0.35  # rad of one load step of the top section
 
 
@@ -98,16 +102,9 @@ class _System:
         return out
 
     def stable(self, position: Array, quaternion: Array) -> bool:
-        """Whether the tangent of a configuration is positive definite: every block pivot of its elimination is."""
-        self.assemble(position, quaternion)
-        diagonal, lower, upper, _ = self.blocks
-        pivot = diagonal[0]
-        for k in range(len(lower)):
-            if np.linalg.eigvalsh(pivot + pivot.T)[0] <= 0.0:
-                return False
-            pivot = diagonal[k + 1] - lower[k] @ np.linalg.solve(pivot, upper[k])
-        last = pivot[self.held :, self.held :]
-        return last.size == 0 or bool(np.linalg.eigvalsh(last + last.T)[0] > 0.0)
+        """Whether the tangent of a configuration is positive definite."""
+        static_system(self.line, self.water, position, quaternion, *self.blocks)
+        return positive(self.line, quaternion, self.blocks[:3], self.scales / self.line.length.sum())
 
 
 def relax(line: Line, water: Water, position: Array, quaternion: Array, scales: tuple[float, float], limit: int) -> Equilibrium:
@@ -148,7 +145,8 @@ def _damped(system: _System, trial: tuple[Array, Array], limit: int) -> Equilibr
     damping, lowest, best, good = 0.0, math.inf, math.inf, trial
     for iteration in range(limit):
         potential, size, top, foot = system.assemble(*trial)
-        if size <= TOLERANCE and system.eliminate(0.0):
+        resting = size <= TOLERANCE or (size <= ROUND_OFF and damping > _STALLED)
+        if resting and system.eliminate(0.0):
             return Equilibrium(True, *trial, top, foot, system.stiffness(), system.stable(*trial), iteration, size)
         if size < LOST and (size < best or potential < lowest):
             best, lowest, good = size, potential, trial
@@ -164,8 +162,10 @@ def _damped(system: _System, trial: tuple[Array, Array], limit: int) -> Equilibr
         if move is None or damping >= _MOST_DAMPING:
             break
         trial = _moved(good, move)
-    _, _, top, foot = system.assemble(*good)
-    return Equilibrium(False, *good, top, foot, np.zeros((6, 6)), False, limit, best)
+    _, size, top, foot = system.assemble(*good)
+    if size <= ROUND_OFF and system.eliminate(0.0):
+        return Equilibrium(True, *good, top, foot, system.stiffness(), system.stable(*good), limit, size)
+    return Equilibrium(False, *good, top, foot, np.zeros((6, 6)), False, limit, size)
 
 
 def _moved(configuration: tuple[Array, Array], move: Array) -> tuple[Array, Array]:
@@ -180,15 +180,11 @@ def solve(line: Line, s: Array, water: Water, top: tuple[float, float, float], a
 
     line, s (n,): the discretised line; water: current at the time of the start.
     """
-    length = float(s[-1])
-    position, quaternion = catenary.shape(s, length, top, line.bed.shape[0] > 0)
-    if line.foot_clamped:
-        quaternion[0] = (1.0, 0.0, 0.0, 0.0)
     weight = float(np.abs(line.weight * line.length).sum())
     scales = weight, weight * float(line.length.max())
     still = Water(np.zeros(0), np.zeros((0, 3)), False)
     free = line._replace(top_clamped=False)
-    result = relax(free, still, position, quaternion, scales, limit)
+    result = _hung(free, still, s, top, scales, limit)
     if result.converged and water.levels.shape[0] > 0:
         result = _with_current(free, water, result, scales, limit)
     if attitude is None or not line.top_clamped or not result.converged:
@@ -204,6 +200,38 @@ def solve(line: Line, s: Array, water: Water, top: tuple[float, float, float], a
         if not result.converged:
             break
     return result
+
+
+def _hung(line: Line, water: Water, s: Array, top: tuple[float, float, float], scales: tuple[float, float], limit: int) -> Equilibrium:
+    """Equilibrium of the line hanging from `top` (3,): from the catenary, or else hauled in from where it is nearly taut."""
+    found = relax(line, water, *_catenary(line, s, top), scales, limit)
+    if found.converged and found.stable:
+        return found
+    x, y, z = top
+    reach = _HAULED_FROM * math.sqrt(max(float(s[-1]) ** 2 - z * z, 0.0)) / max(math.hypot(x, y), 1e-9)
+    away = (reach * x, reach * y, z) if x or y else (_HAULED_FROM * math.sqrt(max(float(s[-1]) ** 2 - z * z, 0.0)), 0.0, z)
+    result = relax(line, water, *_catenary(line, s, away), scales, limit)
+    way = np.array(top) - away
+    reached, step = 0.0, 1.0 / _HAULS
+    while result.converged and reached < 1.0:
+        wanted = min(1.0, reached + step)
+        move = np.outer(s / s[-1], (wanted - reached) * way)
+        trial = relax(line, water, result.position + move, result.quaternion, scales, limit)
+        if trial.converged and trial.stable:
+            reached, result, step = wanted, trial, min(1.5 * step, 1.0 / _HAULS)
+        elif step < 1.0 / 2048.0:
+            return found if found.converged else trial
+        else:
+            step *= 0.5
+    return result if (result.converged and result.stable) or not found.converged else found
+
+
+def _catenary(line: Line, s: Array, top: tuple[float, float, float]) -> tuple[Array, Array]:
+    """Pose in which the search starts."""
+    position, quaternion = catenary.shape(s, float(s[-1]), top, line.bed.shape[0] > 0)
+    if line.foot_clamped:
+        quaternion[0] = (1.0, 0.0, 0.0, 0.0)
+    return position, quaternion
 
 
 def _with_current(line: Line, water: Water, start: Equilibrium, scales: tuple[float, float], limit: int) -> Equilibrium:

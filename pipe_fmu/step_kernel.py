@@ -46,8 +46,10 @@ def element_strains(line, position, quaternion, out):
 
 
 @kernel
-def step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, system, works):
+def step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, sharp, system, works):
     """Residual of the step for trial increments `x` (n, 6), and the tangent if `fresh`, into `system` = (diagonal, lower, upper, residual).
+
+    `sharp`: see add_mean_contact.
 
     position, velocity (n, 3), quaternion (n, 4), rate (n, 3) body rates, flow (n, 3) or (0, 3) body velocity of the added mass,
     strain (n - 1, 7): old state. Fills new_strain (n - 1, 7) and works (6,). Returns (force scale [N], moment scale [N m]).
@@ -164,6 +166,7 @@ def step_system(line, water, h, position, quaternion, velocity, rate, flow, stra
                 mean[STRAINS],
                 new[STRAINS],
                 fresh,
+                sharp,
                 vector,
                 twelve,
             )

@@ -162,16 +162,48 @@ def turned(position, quaternion, x):
     return position + x[:, :3], np.array([times(rotation_vector_quaternion(t), q) for t, q in zip(x[:, 3:], quaternion, strict=True)])
 
 
-def dense_equilibrium(line, position, quaternion, free, load=0.0, limit=40):
-    """Newton's method on dense matrices: rest under dead nodal forces and moments `load` (6 n,) with only the unknowns `free` moving."""
+def node_numbers(lines):
+    """Numbers of the nodes of lines joined end to end: the last of one is the first of the next, each kept with its own attitude."""
+    sizes = [len(line.mass) for line in lines]
+    return np.arange(sum(sizes)) - np.repeat(np.arange(len(sizes)), sizes)
+
+
+def joined(lines, system):
+    """(residual, tangent) of lines joined rigidly, at any angle, end to end; `system(line, part)` gives those of the nodes `part`.
+
+    A rigid joint makes displacement and spin of the two ends the same and leaves their attitudes apart: exact for any rotation.
+    """
+    n = node_numbers(lines)[-1] + 1
+    residual, tangent, first = np.zeros(6 * n), np.zeros((6 * n, 6 * n)), 0
+    for k, line in enumerate(lines):
+        part = slice(first, first + len(line.mass))
+        own = slice(6 * (part.start - k), 6 * (part.stop - k))
+        r, t = system(line, part)[:2]
+        residual[own] += r
+        tangent[own, own] += t
+        first = part.stop
+    return residual, tangent
+
+
+def members(line):
+    """A line as the only member of a list, a list of lines as it is."""
+    return line if isinstance(line, list) else [line]
+
+
+def dense_equilibrium(line, position, quaternion, free, load=0.0, limit=40, turn=0.5):
+    """Newton's method on dense matrices: rest under dead nodal forces and moments `load` (6 n,) with only the unknowns `free` moving.
+
+    line: one, or a list of lines joined end to end. turn: largest rotation of a node in one correction [rad].
+    """
+    lines = members(line)
+    node = node_numbers(lines)
     for _ in range(limit):
-        residual, tangent, _ = static_system(line, position, quaternion)
-        residual = residual - load
-        x = np.zeros(6 * len(position))
-        x[free] = np.linalg.solve(tangent[np.ix_(free, free)], -residual[free])
-        x *= min(1.0, 0.5 / max(np.abs(x.reshape(-1, 6)[:, 3:]).max(), 1e-12))
-        position, quaternion = turned(position, quaternion, x.reshape(-1, 6))
-        if np.abs(x).max() < 1e-8 * line.length.sum():
+        residual, tangent = joined(lines, lambda one, part, at=(position, quaternion): static_system(one, *(a[part] for a in at)))
+        x = np.zeros(len(residual))
+        x[free] = np.linalg.solve(tangent[np.ix_(free, free)], -(residual - load)[free])
+        x *= min(1.0, turn / max(np.abs(x.reshape(-1, 6)[:, 3:]).max(), 1e-12))
+        position, quaternion = turned(position, quaternion, x.reshape(-1, 6)[node])
+        if np.abs(x).max() < 1e-8 * sum(one.length.sum() for one in lines):
             return position, quaternion
     raise RuntimeError("no equilibrium")
 
@@ -189,7 +221,7 @@ def step_system(line, old, x, h, water=STILL, flow=None):
     strain, new_strain, works = np.empty((n - 1, 7)), np.empty((n - 1, 7)), np.empty(6)
     step_kernel.element_strains(line, position, quaternion, strain)
     flow = np.zeros((len(line.added_mass), 3)) if flow is None else flow
-    step_kernel.step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, True, system, works)
+    step_kernel.step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, True, True, system, works)
     return system[3].ravel(), assembled(*system[:3]), new_strain, works
 
 
@@ -207,16 +239,28 @@ def centres(line, position, quaternion):
     return position + line.offset[:, None] * np.array([rotation(q)[:, 0] for q in quaternion])
 
 
-def free_step(line, old, h, water=STILL, limit=60):
-    """Step of a line whose ends are both free: Newton's method on dense matrices, to round-off."""
-    n = len(old[0])
-    x = np.hstack([h * old[2], np.array([h * rotation(q) @ w for q, w in zip(old[1], old[3], strict=True)])])
+def free_step(line, old, h, water=STILL, limit=60, load=0.0, held=()):
+    """Step of a line whose ends are both free: Newton's method on dense matrices, to round-off.
+
+    line: one, or a list of lines joined end to end. load (6 n,): dead nodal loads, means over the step; held: unknowns at rest.
+    """
+    lines = members(line)
+    node = node_numbers(lines)
+    n = node[-1] + 1
+    length = sum(one.length.sum() for one in lines)
+    free = np.setdiff1d(np.arange(6 * n), held)
+    x = np.zeros((n, 6))
+    x[node] = np.hstack([h * old[2], np.array([h * rotation(q) @ w for q, w in zip(old[1], old[3], strict=True)])])
+    x.reshape(-1)[list(held)] = 0.0
     size = math.inf
     for _ in range(limit):
-        residual, tangent, _, _ = step_system(line, old, x, h, water)
-        dx = np.linalg.solve(tangent, -residual)
-        x = x + dx.reshape(n, 6)
+        wide = x[node]
+        residual, tangent = joined(lines, lambda one, part, wide=wide: step_system(one, [a[part] for a in old], wide[part], h, water))
+        dx = np.linalg.solve(tangent[np.ix_(free, free)], (load - residual)[free])
+        x.reshape(-1)[free] += dx
         before, size = size, np.abs(dx).max()
-        if size < 1e-13 * line.length.sum() or (size < 1e-9 * line.length.sum() and size > 0.3 * before):
-            return moved(line, old, x, h)
+        if size < 1e-13 * length or (size < 1e-9 * length and size > 0.3 * before):
+            parts, wide = np.cumsum([len(one.mass) for one in lines])[:-1], x[node]
+            pieces = zip(lines, zip(*(np.split(a, parts) for a in old), strict=True), np.split(wide, parts), strict=True)
+            return tuple(np.concatenate(a) for a in zip(*(moved(one, state, way, h) for one, state, way in pieces), strict=True))
     raise RuntimeError(f"free step of {h} s: last correction {size:.1e}")

@@ -34,7 +34,9 @@ class Ports:
 class StillDrive:
     """Units at rest that exchange a little energy; `fate` says what happens at 1 s."""
 
+    scheme = "energy-consistent"
     ledger = SimpleNamespace(
+        kinds={"pipe.kinetic_energy": "stored"},
         names=["pipe.kinetic_energy", "interface_residual", "closure", "exchanged"],
         row=[3.0, 0.0, 1e-9, 1e3],
         complaint="",

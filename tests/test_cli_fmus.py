@@ -2,6 +2,7 @@
 
 import json
 import re
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,13 @@ from master import drive, scene
 from master.__main__ import main
 from master.bond import FmuEnd, mobility_end
 from master.drive import open_drive
+from master.fmu import Fmu
 from master.ledger import EnergyCheckFailed
 from master.prepared import prepare
 
+EXPORTED = (
+    "pipe.fmu", "vessel.fmu", "system.ssp", "OspSystemStructure.xml", "Pipe_OspModelDescription.xml", "Vessel_OspModelDescription.xml",
+)  # fmt: skip
 ROUND_OFF = 1e-12  # of the largest term of the energy
 BUSY = ["environment.current.start=0", "environment.current.ramp=4", "vessel.controller.start=2", "simulation.snapshots=[]"]
 
@@ -123,12 +128,47 @@ def test_a_bad_value_in_a_units_table_is_a_mistake_of_the_user(capsys, tmp_path)
 
 def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
     assert main(["export", "-o", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.split() == [str(tmp_path / "pipe.fmu"), str(tmp_path / "vessel.fmu")]
+    assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in EXPORTED]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(EXPORTED)
     loaded = scene.load("paper")
     exported = replace(prepare(loaded), fmus={name: tmp_path / f"{name}.fmu" for name in ("pipe", "vessel")})
     with open_drive(loaded.sections, exported) as moving:
         gap = drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
         assert max(gap.values()) < 1e-9
+
+
+@pytest.mark.parametrize("unit", ["pipe", "vessel"])
+def test_a_rollback_is_bitwise_and_cheap(unit):
+    """All outputs, after a live and after a serialised state; saving, restoring and freeing cost less than half a step."""
+    loaded = scene.load("paper", BUSY)
+    fmu_file = prepare(loaded).fmus[unit]
+    with Fmu(fmu_file, unit) as fmu:
+        fmu.initialize()
+        flows = ("velocity", "angular_velocity") if unit == "pipe" else ("force", "moment")
+        held = np.array([0.3, -0.2, 0.1, 1e-3, 2e-3, -1e-3]) * (1.0 if unit == "pipe" else 1e6)
+        everything = tuple(fmu.names("output"))
+        rollback, stepping = [], []
+        for k in range(40):
+            begun = time.perf_counter()
+            state = fmu.snapshot()
+            fmu.restore(state)
+            fmu.release(state)
+            saved = time.perf_counter()
+            fmu.set(flows, held * np.sin(k))
+            fmu.step(0.1 * k, 0.1)
+            stepping.append(time.perf_counter() - saved)
+            rollback.append(saved - begun)
+        assert np.median(rollback) < 0.5 * np.median(stepping)
+        state = fmu.snapshot()
+        copy = fmu.deserialize(fmu.serialize(state))
+        fmu.step(4.0, 0.1)
+        expected = fmu.get(everything)
+        for saved_state in (state, copy):
+            fmu.set(flows, np.zeros(6))
+            fmu.step(4.1, 0.2)
+            fmu.restore(saved_state)
+            fmu.step(4.0, 0.1)
+            np.testing.assert_array_equal(fmu.get(everything), expected)
 
 
 def test_statics_prints_the_equilibrium_as_json(capsys):

@@ -1,13 +1,16 @@
 """Theorems of the coupling, on a spring (with or without a mass of its own) tied to a body, both FMUs, through FMPy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from units.toys import build_pair, tied
 
-from master.bond import hang_off
+from master.bond import Bond, impedance_end, mobility_end
 from master.coupling import CouplingFailed, coupling
 from master.extrapolation import Extrapolation
-from master.fmu import FmuFailed
+from master.fmu import STEP_FAILURES, FmuFailed
+from master.hang_off import hang_off
 
 PUSH = {"start_velocity": [1.0, 0.5, 0.0], "start_rotation": [0.0, 0.2, -0.1]}
 
@@ -187,3 +190,112 @@ def test_extrapolation_of_a_parabola_over_uneven_steps_is_exact():
     for time in (0.1, 0.15, 0.4, 0.6, 0.7):
         guess.add(time, *value(time))
     np.testing.assert_allclose(np.concatenate(guess.at(1.0)), np.concatenate(value(1.0)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("step", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("mass", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("spring", [{}, {"stiffness": 1e-3, "damping": 1.0}, {"inertia": 1.0}, {"inertia": 1.0, "damping": 0.3}])
+def test_one_solve_each_without_rollback_does_not_grow_at_any_mass_ratio(files, spring, mass, step):
+    body = {"mass": mass, "inertia": mass, "damping": 0.05, "stiffness": 0.1, "load": [0.3, 0.0, 0.0], **PUSH}
+    with tied(files, spring, body, step, rollback=False, action="warn") as pair:
+        energies = []
+        for i in range(300):
+            pair.run_one(i * step, step)
+            energies.append(energy(pair))
+        assert pair.coupling.impedance.solves == pair.coupling.mobility.solves == 300
+        assert max(energies[150:]) < 1.5 * max(energies[:150])
+        assert max(energies) < 1e3
+        np.testing.assert_allclose(pair.spring.get("stretch"), pair.body.get("position"), rtol=1e-9, atol=1e-9)
+
+
+def test_one_solve_each_leaves_a_residual_that_is_measured_and_falls_with_the_step(files):
+    def left(step):
+        with tied(files, {"hardening": 2.0}, {**PUSH, "damping": 0.1}, step, rollback=False, action="warn") as pair:
+            pair.run(step, 10.0)
+            ledger = pair.ledger
+            assert abs(ledger.closure) == pytest.approx(abs(pair.spring.get("top_work")[0] + pair.body.get("bond_work")[0]), rel=1e-9)
+            return ledger.interface_residual / ledger.exchanged
+
+    assert left(0.01) < left(0.05) / 5.0 < 1e-2
+
+
+def test_the_residual_of_an_exchange_of_end_values_is_that_of_what_the_units_report(files):
+    for scheme in ("serial", "parallel"):
+        with tied(files, {"damping": 0.2}, PUSH, 0.1, scheme=scheme, action="warn") as pair:
+            pair.coupling.check = lambda step, check=pair.ledger.check: check(step) or True
+            for i in range(20):
+                done = pair.coupling.advance(0.1 * i, 0.1)
+                assert done.residual == pytest.approx(pair.ledger.step_residual, rel=1e-9)
+            assert pair.ledger.interface_residual > 1e-3 * pair.ledger.exchanged
+
+
+class Failing:
+    """An FMU whose answers are NaN, or which is in error, from a time on for steps above a length."""
+
+    def __init__(self, fmu, kind, above):
+        self._fmu, self._kind, self._above, self._bad, self.tries = fmu, kind, above, False, []
+
+    def __getattr__(self, name):
+        return getattr(self._fmu, name)
+
+    def step(self, time, step, final=False):
+        self._fmu.step(time, step, final)
+        self._bad = time >= 0.5 - 1e-9 and step > self._above
+        if self._bad:
+            self.tries.append(step)
+            if self._kind == "error":
+                raise STEP_FAILURES[3]("spring: step: broken")
+
+    def restore(self, state):
+        self._bad = False
+        self._fmu.restore(state)
+
+    def get(self, names):
+        return self._fmu.get(names) * (np.nan if self._bad and names == ("force", "moment") else 1.0)
+
+
+@pytest.mark.parametrize("kind", ["nan", "error"])
+def test_an_error_or_a_number_that_is_none_is_rolled_back_and_tried_once_more_with_half_the_step(files, kind):
+    for above, cured in ((0.06, True), (0.0, False)):
+        with tied(files, {}, PUSH, 0.1) as pair, tied(files, {}, PUSH, 0.1) as sound:
+            pair.coupling.impedance.fmu = failing = Failing(pair.spring, kind, above)
+            sound.run(0.1, 0.5)
+            pair.run(0.1, 0.5)
+            if cured:
+                pair.run_one(0.5, 0.1)
+                assert failing.tries[0] == pytest.approx(0.1)
+                assert pair.coupling.counters.steps == 7
+                continue
+            with pytest.raises(CouplingFailed, match="not finite" if kind == "nan" else "broken") as caught:
+                pair.run_one(0.5, 0.1)
+            assert caught.value.time == pytest.approx(0.5)
+            np.testing.assert_allclose(failing.tries, [0.1, 0.05])
+            np.testing.assert_array_equal(pair.state, sound.state)  # both stand where they stood before
+            assert pair.spring._states == pair.body._states == set()
+
+
+def test_directional_derivatives_serve_where_there_is_no_port(files):
+    with tied(files, {"hardening": 10.0}, PUSH, 0.1, by_port=False) as pair, tied(files, {"hardening": 10.0}, PUSH, 0.1) as port:
+        calls = []
+
+        def derivatives(results, held):
+            calls.append((results, held))
+            return -pair.spring.get("impedance").reshape(6, 6)
+
+        pair.spring.has_derivatives, pair.spring.derivatives = True, derivatives
+        pair.run(0.1, 2.0)
+        port.run(0.1, 2.0)
+        assert set(calls) == {(("force", "moment"), ("velocity", "angular_velocity"))}
+        assert pair.coupling.impedance.solves == port.coupling.impedance.solves
+        np.testing.assert_allclose(pair.state, port.state, rtol=1e-9)
+
+
+def test_a_reversed_effort_port_is_turned_round(files):
+    bond = Bond(tuple(replace(pair, reverse=True) for pair in hang_off().pairs))
+    wrong, right = {"gain": -1.0, "hardening": 1.0}, {"hardening": 1.0}
+    with tied(files, wrong, PUSH, 0.1, checked=False) as pair, tied(files, right, PUSH, 0.1) as good:
+        ends = impedance_end(pair.spring, bond), mobility_end(pair.body, bond)
+        pair.coupling = coupling("energy-consistent", *ends, bond, 0.1)
+        pair.run(0.1, 3.0)
+        good.run(0.1, 3.0)
+        np.testing.assert_allclose(pair.state, good.state, rtol=1e-8, atol=1e-12)

@@ -89,7 +89,8 @@ def mean_contact(bed, ends, new_z, dt=0.1):
     vector, matrix = np.zeros(12), np.zeros((12, 12))
     row = np.zeros(9)
     old_z = np.array([-0.02, 0.01, 0.005])
-    lost = loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, np.array(bed), old_z, np.array(new_z), ends, row, row, True, vector, matrix)
+    sides = np.array(bed), old_z, np.array(new_z), ends, row, row
+    lost = loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, *sides, True, True, vector, matrix)
     return lost, vector
 
 
@@ -132,6 +133,25 @@ def test_friction_below_its_speed_is_viscous():
     _, vector = mean_contact([0.0, 0.6, 1e-3], ends, [-0.02, 0.01, 0.005])
     _, normal = mean_contact([0.0, 0.0, 1e-3], ends, [-0.02, 0.01, 0.005])
     assert vector[0] + vector[6] == pytest.approx(0.6 * (normal[2] + normal[8]) * 1e-4, rel=1e-6)
+
+
+def test_tangent_of_the_friction_is_the_derivative_by_the_way_slid():
+    """At about the friction speed, sliding askew, elements' ends at different velocities."""
+    ends, dt = np.zeros((2, 6)), 0.1
+    ends[:, :2] = [[8e-4, -5e-4], [3e-4, 9e-4]]
+
+    def sliding(velocities):
+        vector, matrix = np.zeros(12), np.zeros((12, 12))
+        z, row = np.array([-0.02, 0.01, 0.005]), np.zeros(9)
+        loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, np.array([0.0, 0.5, 1e-3]), z, z, velocities, row, row, True, vector, matrix)
+        return vector, matrix
+
+    _, tangent = sliding(ends)
+    for node, way in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        change = np.zeros((2, 6))
+        change[node, way] = 1e-8
+        slope = (sliding(ends + change)[0] - sliding(ends - change)[0]) / (2e-8 * dt)
+        np.testing.assert_allclose(tangent[[0, 1, 6, 7], 6 * node + way], slope[[0, 1, 6, 7]], rtol=1e-6)
 
 
 def test_drag_is_morisons_across_and_along():
@@ -213,6 +233,18 @@ def test_still_pipe_in_a_uniform_current_gets_the_fixed_end_forces_of_a_beam():
     assert lost == pytest.approx(supplied, rel=1e-12)
     np.testing.assert_allclose(vector[[1, 7]], -q * 10 / 2, rtol=1e-12)  # minus the force on the pipe
     np.testing.assert_allclose(vector[[5, 11]], [-q * 100 / 12, q * 100 / 12], rtol=1e-12)
+
+
+def test_current_on_an_arc_is_that_at_the_depth_of_its_points():
+    """An arc from -50 to -50 m that hangs 0.5 m below its chord, in a current that vanishes at -50 m: z + 50 = 2 x (1 - x) in it."""
+    bend = np.array([0.0, 0.4, 0.0])
+    ends = (rotation_vector_quaternion(sign * 0.5 * bend) for sign in (-1, 1))
+    frame = element.frame(*(tuple(q) for q in ends), (10.0, 0.0, 0.0))
+    levels, flow = np.array([-51.0, -49.0]), np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
+    vector, matrix = np.zeros(12), np.zeros((12, 12))
+    depths = np.array([-50.0, -50.0])
+    loads.add_drag(*frame, 10.0, np.array([7.0, 200.0]), np.zeros((2, 6)), depths, levels, flow, 0.0, True, vector, matrix)
+    assert vector[1] + vector[7] == pytest.approx(-10.0 * 200.0 * (2.0 / 6.0) ** 2, rel=1e-12)  # x (1 - x) = 1 / 6 at the Gauss points
 
 
 def test_element_drag_tangent_is_the_derivative_with_respect_to_velocity():

@@ -69,6 +69,21 @@ def test_left_jacobian_is_the_spin_of_a_changing_rotation_vector(angle):
     np.testing.assert_allclose(jacobian @ theta, theta, atol=1e-15)  # a rotation vector is the spin along itself
 
 
+def test_log_of_the_smallest_turns_keeps_its_third_order():
+    half = 0.9e-5 * AXIS
+    np.testing.assert_allclose(so3.log((math.sqrt(1.0 - half @ half), *half)), 2.0 * (1.0 + half @ half / 6.0) * half, rtol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.9e-3, 1.1e-3])
+def test_left_jacobian_of_small_turns_is_its_power_series(angle):
+    """J_l = sum of hat^k / (k + 1)!; the terms of order four and five are round-off here."""
+    skew = hat(angle * AXIS)
+    series = np.eye(3) + skew / 2 + skew @ skew / 6 + skew @ skew @ skew / 24 + skew @ skew @ skew @ skew / 120
+    got = np.array([so3.left_jacobian_transposed(tuple(angle * AXIS), tuple(row)) for row in np.eye(3)])
+    tolerance = 2e-15 if angle < 1e-3 else 1e-11  # the closed form loses digits where the series ends
+    np.testing.assert_allclose(got, series, rtol=0.0, atol=tolerance)
+
+
 def test_normalize_keeps_the_rotation():
     q = np.array(so3.exp((0.4, -1.1, 0.7)))
     np.testing.assert_allclose(so3.normalize(tuple(1.7 * q)), q, rtol=1e-15)

@@ -96,6 +96,21 @@ def test_output_pose_integrates_the_output_velocity():
         before = after
 
 
+def test_mean_and_end_velocity_are_those_of_the_path_of_the_hang_off_point():
+    """Over a step both ends of which are known, the end velocity is the derivative of the pose, by differences of a short step."""
+    start = Start(velocity=(2.0, -1.0, 0.3), angular_velocity=(0.05, -0.04, 0.1), attitude=(0.2, -0.1, 1.0))
+    vessel = unit(start=start)
+    end = np.concatenate([vessel.output("end_velocity"), vessel.output("end_angular_velocity")])
+    mean = np.concatenate([vessel.output("velocity"), vessel.output("angular_velocity")])
+    assert_allclose(end, mean, rtol=1e-14)  # at the start there is no step behind
+    vessel.step(0.0, 2.0, INPUTS)
+    end = np.concatenate([vessel.output("end_velocity"), vessel.output("end_angular_velocity")])
+    before = vessel.output("hang_off_position")
+    vessel.step(2.0, 1e-6, INPUTS)
+    assert_allclose(np.concatenate([vessel.output("velocity"), vessel.output("angular_velocity")]), end, atol=1e-6)
+    assert_allclose((vessel.output("hang_off_position") - before) / 1e-6, end[:3], atol=1e-6)
+
+
 def test_setting_the_state_restores_every_output():
     vessel = unit(controller=Controller(start=0.0))
     inputs = INPUTS | {"force": np.array([-3e5, 1e4, 9e5])}

@@ -38,6 +38,8 @@ class VesselUnit:
         return hold | {
             "velocity": (3, "m/s", "mean velocity of the hang-off point over the last step, in e"),
             "angular_velocity": (3, "rad/s", "rotation vector of the last step over its length, in e"),
+            "end_velocity": (3, "m/s", "velocity of the hang-off point at the end of the step, in e"),
+            "end_angular_velocity": (3, "rad/s", "angular velocity at the end of the step, in e"),
             "mobility": (36, "", "row-major response of (velocity, angular_velocity) to (force, moment), last step"),
             "hang_off_position": (3, "m", "hang-off point, in e"),
             "hang_off_quaternion": (4, "1", "orientation of the pipe section held there, t to e, scalar first"),
@@ -95,6 +97,9 @@ class VesselUnit:
             return works | {"control_work": works["control_work"] + vessel.hold_energy(state)}  # less what the hold's potential holds
         if name in ("velocity", "angular_velocity"):
             return {"velocity": state.mean_velocity[:3], "angular_velocity": state.mean_velocity[3:]}
+        if name in ("end_velocity", "end_angular_velocity"):
+            end = vessel.hang_off_velocity(state.quaternion, state.body_velocity)
+            return {"end_velocity": end[:3], "end_angular_velocity": end[3:]}
         if name in ("hang_off_position", "hang_off_quaternion"):
             point, quaternion = vessel.hang_off_pose(vessel.position(state), state.quaternion)
             return {"hang_off_position": point, "hang_off_quaternion": quaternion}

@@ -76,11 +76,7 @@ class Vessel:
         position = np.add(start.position, (0.0, 0.0, self.depth))
         quaternion = quaternion_from_angles(*start.attitude)
         nu = np.array([*start.velocity, *start.angular_velocity])
-        rotation = rotation_matrix(quaternion)
-        mean_velocity = np.concatenate([
-            rotation @ (nu[:3] + np.cross(nu[3:], self.hull.hang_off)),
-            rotation @ nu[3:],
-        ])  # fmt: skip
+        mean_velocity = self.hang_off_velocity(quaternion, nu)
         pose = np.array([position[0], position[1], start.attitude[2]])
         control = initial_control(np.array(self.parameters.hold_force), pose)
         return State(position, quaternion, nu, mean_velocity, np.zeros((6, 6)), np.zeros(len(WORKS)), control)
@@ -151,6 +147,11 @@ class Vessel:
         """Hang-off point (3,), m in e, and orientation (4,) t to e of the pipe section held there, for a pose of the hull."""
         point = position + rotation_matrix(quaternion) @ self.hull.hang_off
         return point, multiply(quaternion, self.held_section)
+
+    def hang_off_velocity(self, quaternion: Array, nu: Array) -> Array:
+        """Velocity, m/s, and angular velocity, rad/s, of the hang-off point, (6,) in e, for a body velocity nu (6,)."""
+        rotation = rotation_matrix(quaternion)
+        return np.concatenate([rotation @ (nu[:3] + np.cross(nu[3:], self.hull.hang_off)), rotation @ nu[3:]])
 
     def moment_about_centre(self, quaternion: Array, force: Array, moment: Array) -> Array:
         """Moment (3,), N m in e, about the centre of gravity of a force and a moment at the hang-off point."""

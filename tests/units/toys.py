@@ -10,15 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from master.bond import Bond, FmuEnd, hang_off, impedance_end, mobility_end
-from master.coupling import Check, EnergyConsistent, Explicit, coupling
+from master import stability
+from master.bond import Bond, FmuEnd, end_value_ends, impedance_end, mobility_end
+from master.coupling import Check, EnergyConsistent, Explicit, OneSolve, coupling
 from master.fmi.build import Recipe, build_fmu
 from master.fmu import Fmu
+from master.hang_off import hang_off
 from master.ledger import Action, Columns, Ledger
 
 HERE = Path(__file__).parent
 SPRING = Recipe(HERE / "spring_fmu", "slave.SpringUnit", {}, "Six springs")
-BODY = Recipe(HERE / "body_fmu", "slave.BodyUnit", {})
+BODY = Recipe(Path(stability.__file__).parent / "units" / "body_fmu", "slave.BodyUnit", {})
 SPRING_COLUMNS = Columns(("kinetic_energy", "elastic_energy"), ("current_work",), ("drag_dissipation",), "top_work")
 BODY_COLUMNS = Columns(("kinetic_energy", "restoring_energy"), ("environment_work",), ("damping_dissipation",), "bond_work")
 
@@ -39,7 +41,7 @@ class Pair:
 
     spring: Fmu
     body: Fmu
-    coupling: EnergyConsistent | Explicit
+    coupling: EnergyConsistent | OneSolve | Explicit
     ledger: Ledger
 
     def run(self, step: float, end: float) -> None:
@@ -70,6 +72,7 @@ def tied(
     action: Action = "stop",
     tolerance: float = 1e-10,
     checked: bool = True,
+    rollback: bool = True,
 ) -> Iterator[Pair]:
     """Spring and body FMU, initialised and coupled; `by_port` False leaves the master to difference quotients."""
     with Fmu(files[0], "spring") as a, Fmu(files[1], "body") as b:
@@ -78,16 +81,12 @@ def tied(
         bond = hang_off()
         ledger = Ledger([(a, SPRING_COLUMNS), (b, BODY_COLUMNS)], action=action)
         check: Check = ledger.check if checked else lambda _: True
-        ends = _ends(a, b, bond, scheme, by_port)
+        ends = _ends(a, b, bond, scheme, by_port, rollback)
         yield Pair(a, b, coupling(scheme, *ends, bond, step, tolerance, check), ledger)
 
 
-def _ends(a: Fmu, b: Fmu, bond: Bond, scheme: str, by_port: bool) -> tuple[FmuEnd, FmuEnd]:
+def _ends(a: Fmu, b: Fmu, bond: Bond, scheme: str, by_port: bool, rollback: bool) -> tuple[FmuEnd, FmuEnd]:
     if scheme == "energy-consistent":
         named = ("impedance", "mobility") if by_port else (None, None)
-        return impedance_end(a, bond, named[0]), mobility_end(b, bond, named[1])
-    # explicit schemes exchange the values at the end of the step
-    return (
-        FmuEnd(a, bond.flows, ("end_force", "end_moment")),
-        FmuEnd(b, bond.efforts, ("end_velocity", "end_angular_velocity")),
-    )
+        return impedance_end(a, bond, named[0], rollback), mobility_end(b, bond, named[1], rollback)
+    return end_value_ends(a, b, bond)

@@ -1,0 +1,98 @@
+"""What moves two FMUs on a power bond, as a scene of any two FMUs names them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from master.bond import end_value_ends, impedance_end, mobility_end
+from master.coupling import coupling
+from master.drive import Row, snapped
+from master.fmu import Fmu
+from master.ledger import Ledger
+from master.recorder import Signal
+from master.units import General, Wiring, loaded
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Macro steps accepted and rejected, and steps asked of each unit."""
+
+    macro_steps: int
+    rejected_steps: int
+    impedance_solves: int
+    mobility_solves: int
+
+
+class Bonded:
+    """Two initialised FMUs; see `master.drive.Drive`."""
+
+    def __init__(self, scene: General, wiring: Wiring) -> None:
+        table, rules, bond = scene.bond, scene.coupling, wiring.bond()
+        impedance, mobility = wiring.fmus[table.impedance], wiring.fmus[table.mobility]
+        self.time = 0.0
+        self.units: Mapping[str, Fmu] = wiring.fmus
+        self._wires, self._macro_step = wiring.connections(), scene.simulation.macro_step
+        if rules.scheme == "energy-consistent":
+            self._ends = (
+                impedance_end(impedance, bond, table.impedance_derivative or None, rules.rollback),
+                mobility_end(mobility, bond, table.mobility_derivative or None, rules.rollback),
+            )
+        else:
+            self._ends = end_value_ends(impedance, mobility, bond)
+        reported = [(wiring.fmus[name], scene.units[name].energy) for name in (table.impedance, table.mobility)]
+        sources = [(fmu, energy.columns) for fmu, energy in reported if energy is not None]
+        self.ledger = Ledger(sources if len(sources) == 2 else [], rules.energy_check, rules.on_violation, bond.idle_power)
+        self._coupling = coupling(rules.scheme, *self._ends, bond, self._macro_step, rules.tolerance, self.ledger.check)
+
+    @property
+    def scheme(self) -> str:
+        """The coupling in words."""
+        return self._coupling.words
+
+    @property
+    def effort(self) -> Effort:
+        """What it cost so far."""
+        done = self._coupling.counters
+        return Effort(done.steps, done.rejected_steps, self._ends[0].solves, self._ends[1].solves)
+
+    def advance(self, end: float) -> None:
+        """Take one step, not beyond `end` [s]; the further connections hold what they carry now."""
+        for source, output, target, name in self._wires:
+            target.set(name, source.get(output))
+        step = self._coupling.advance(self.time, end - self.time)
+        self.time = snapped(step.time + step.step, self._macro_step, end)
+
+    def derived(self) -> Row:
+        """Nothing beside the ports."""
+        return {}
+
+
+def signals(scene: General, units: Mapping[str, Fmu]) -> list[Signal]:
+    """The outputs to record, columns named unit.port and unit.port[i]."""
+    found = []
+    for unit, table in scene.units.items():
+        for name in table.outputs:
+            port = units[unit].port(name)
+            names = [f"{unit}.{name}"] if port.size == 1 else [f"{unit}.{name}[{i}]" for i in range(1, port.size + 1)]
+            found.append(Signal(unit, name, tuple((column, port.unit or "1") for column in names)))
+    return found
+
+
+@contextmanager
+def open_bonded(scene: General) -> Iterator[Bonded]:
+    """Load, check and initialise the FMUs of a scene; the mobility unit starts with the other's effort.
+
+    Raises UsageError for what the scene has wrong, FmuFailed where an FMU refuses.
+    """
+    with loaded(scene) as wiring:
+        bond, table = wiring.bond(), scene.bond
+        impedance, mobility = wiring.fmus[table.impedance], wiring.fmus[table.mobility]
+        wiring.connections()
+        impedance.initialize(scene.settings[table.impedance]["parameters"], inputs=scene.settings[table.impedance]["inputs"])
+        inputs = dict(scene.settings[table.mobility]["inputs"])
+        for pair, name in zip(bond.pairs, bond.effort_inputs, strict=True):
+            inputs[name] = impedance.get(pair.effort) * (-1.0 if pair.reverse else 1.0)
+        mobility.initialize(scene.settings[table.mobility]["parameters"], inputs=inputs)
+        yield Bonded(scene, wiring)

@@ -1,0 +1,138 @@
+"""Files that tell other hosts how pipe and vessel are connected: SSP 1.0, and the pair of the Open Simulation Platform.
+
+Hosts without rollback exchange values once a step. What suits them is the vessel's velocity at the end of its step, held by
+the pipe over the next one, and the pipe's mean pull, held by the vessel: stable for any step the pipe resolves, and of first
+order. A master that iterates connects the vessel's mean velocity instead (`master.bond`).
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
+
+from .description import base_unit, scalar_names
+
+SSD, SSC = "http://ssp-standard.org/SSP1/SystemStructureDescription", "http://ssp-standard.org/SSP1/SystemStructureCommon"
+OSP_SYSTEM = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
+OSP_MODEL = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
+
+
+class Wire(NamedTuple):
+    """A connection of two vector ports of three components."""
+
+    source: str
+    output: str
+    target: str
+    input: str
+
+
+WIRES = (
+    Wire("vessel", "end_velocity", "pipe", "velocity"),
+    Wire("vessel", "end_angular_velocity", "pipe", "angular_velocity"),
+    Wire("pipe", "force", "vessel", "force"),
+    Wire("pipe", "moment", "vessel", "moment"),
+)
+PORTS = {  # unit -> (port element of the OSP, name, its effort and flow: element, FMI name, unit)
+    "pipe": (
+        ("LinearMechanicalPort", "hang-off", ("Force", "force", "N"), ("LinearVelocity", "velocity", "m/s")),
+        ("AngularMechanicalPort", "hang-off section", ("Torque", "moment", "N.m"), ("AngularVelocity", "angular_velocity", "rad/s")),
+    ),
+    "vessel": (
+        ("LinearMechanicalPort", "hang-off", ("Force", "force", "N"), ("LinearVelocity", "end_velocity", "m/s")),
+        ("AngularMechanicalPort", "hang-off section", ("Torque", "moment", "N.m"), ("AngularVelocity", "end_angular_velocity", "rad/s")),
+    ),
+}
+
+
+def write_system(fmus: Mapping[str, Path], folder: Path, macro_step: float, duration: float) -> list[Path]:
+    """system.ssp, OspSystemStructure.xml and the models' port descriptions for the FMUs `pipe` and `vessel`; step and end in s."""
+    structure = structure_description(duration)
+    files = {"OspSystemStructure.xml": osp_structure(fmus, macro_step)}
+    files |= {f"{_model_name(path)}_OspModelDescription.xml": osp_model(name) for name, path in fmus.items()}
+    written = [folder / "system.ssp"]
+    with zipfile.ZipFile(written[0], "w") as archive:
+        archive.writestr("SystemStructure.ssd", _text(structure), zipfile.ZIP_DEFLATED)
+        for name, path in fmus.items():
+            archive.write(path, f"resources/{name}.fmu")
+    for name, root in files.items():
+        (folder / name).write_bytes(_text(root))
+        written.append(folder / name)
+    return written
+
+
+def structure_description(duration: float) -> Element:
+    """SystemStructure.ssd: both FMUs and plain connections; parameters keep the FMUs' defaults."""
+    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    about = {"version": "1.0", "name": "pipelay", "generationTool": "pipelay", "generationDateAndTime": now}
+    root = Element("ssd:SystemStructureDescription", {"xmlns:ssd": SSD, "xmlns:ssc": SSC, **about})
+    system = SubElement(root, "ssd:System", name="pipelay")
+    elements = SubElement(system, "ssd:Elements")
+    for name in PORTS:
+        about = {"name": name, "source": f"resources/{name}.fmu", "type": "application/x-fmu-sharedlibrary"}
+        connectors = SubElement(SubElement(elements, "ssd:Component", about), "ssd:Connectors")
+        for wire in WIRES:
+            for kind, unit, port in (("output", wire.source, wire.output), ("input", wire.target, wire.input)):
+                for scalar in scalar_names(port, 3) if unit == name else ():
+                    SubElement(SubElement(connectors, "ssd:Connector", name=scalar, kind=kind), "ssc:Real")
+    connections = SubElement(system, "ssd:Connections")
+    for wire in WIRES:
+        for start, end in _scalars(wire):
+            ends = {"startElement": wire.source, "startConnector": start, "endElement": wire.target, "endConnector": end}
+            SubElement(connections, "ssd:Connection", ends)
+    SubElement(root, "ssd:DefaultExperiment", startTime="0", stopTime=repr(duration))
+    return root
+
+
+def osp_structure(fmus: Mapping[str, Path], macro_step: float) -> Element:
+    """OspSystemStructure.xml: fixed steps, plain connections.
+
+    Power bonds for ECCO are added through libcosim's interface: its reader of this file accepts one only (libcosimpy 0.0.6).
+    """
+    root = Element("OspSystemStructure", xmlns=OSP_SYSTEM, version="0.1")
+    SubElement(root, "BaseStepSize").text = repr(macro_step)
+    SubElement(root, "Algorithm").text = "fixedStep"
+    simulators = SubElement(root, "Simulators")
+    for name, path in fmus.items():
+        SubElement(simulators, "Simulator", name=name, source=path.name)
+    connections = SubElement(root, "Connections")
+    for wire in WIRES:
+        for start, end in _scalars(wire):
+            connection = SubElement(connections, "VariableConnection")
+            SubElement(connection, "Variable", simulator=wire.source, name=start)
+            SubElement(connection, "Variable", simulator=wire.target, name=end)
+    return root
+
+
+def osp_model(unit: str) -> Element:
+    """The hang-off of a unit as mechanical ports of the OSP."""
+    root = Element("OspModelDescription", xmlns=OSP_MODEL, version="1.0")
+    definitions = SubElement(root, "UnitDefinitions")
+    for symbol in sorted({part[2] for port in PORTS[unit] for part in port[2:]}):
+        exponents = {key: f"{value:g}" for key, value in base_unit(symbol).items()}
+        SubElement(SubElement(definitions, "Unit", name=symbol), "BaseUnit", exponents)
+    groups = SubElement(root, "VariableGroups")
+    for element, name, *parts in PORTS[unit]:
+        port = SubElement(groups, element, name=name)
+        for kind, variable, symbol in parts:
+            group = SubElement(port, kind, name=f"{name} {kind}")
+            for scalar in scalar_names(variable, 3):
+                SubElement(group, "Variable", ref=scalar, unit=symbol)
+    return root
+
+
+def _scalars(wire: Wire) -> Iterator[tuple[str, str]]:
+    return zip(scalar_names(wire.output, 3), scalar_names(wire.input, 3), strict=True)
+
+
+def _model_name(fmu: Path) -> str:
+    with zipfile.ZipFile(fmu) as archive:
+        return fromstring(archive.read("modelDescription.xml")).get("modelName", "")
+
+
+def _text(root: Element) -> bytes:
+    indent(root)
+    return tostring(root, encoding="utf-8", xml_declaration=True)

@@ -1,0 +1,1 @@
+"""Units of the stability cases, each a package that `master.fmi.build` packs into an FMU."""

@@ -1,0 +1,78 @@
+"""Is an equilibrium stable? Symmetric part of the static tangent with the ends held: positive definite if any small push is opposed.
+
+A neutral motion, as the turning of a slack line about the vertical through its two ends, counts as stable.
+"""
+
+import math
+
+import numpy as np
+
+from .block_tridiagonal import SIZE
+from .compiled import kernel
+from .line import Array, Line
+from .so3 import matrix
+
+NEUTRAL = 1e-8  # of the metric: stiffness that counts as none
+_HELD = 1e6  # of the metric: stiffness given to what is held
+
+
+def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], metric: Array) -> bool:
+    """Whether the tangent `blocks` (n, 6, 6), (n - 1, 6, 6) x 2 of free ends is positive definite once they are held.
+
+    quaternion (n, 4); metric (6,): stiffness [N/m, N m] that is compared with.
+    """
+    diagonal, lower, upper = blocks
+    block = 0.5 * (diagonal + diagonal.transpose(0, 2, 1))
+    side = 0.5 * (upper + lower.transpose(0, 2, 1))
+    for node, free in ((0, _foot(line, quaternion)), (-1, _top(line))):
+        block[node] = free @ block[node] @ free + (np.eye(SIZE) - free) * _HELD * metric
+        side[node] = free @ side[node] if node == 0 else side[node] @ free
+    block[:, range(SIZE), range(SIZE)] += NEUTRAL * metric
+    return bool(_cholesky(block, side))
+
+
+def _foot(line: Line, quaternion: Array) -> Array:
+    """Projector (6, 6) on the free motions of the foot: none, or a pinned foot's turning but about t1."""
+    out = np.zeros((SIZE, SIZE))
+    if not line.foot_clamped:
+        axis = np.array(matrix(tuple(quaternion[0])))[:, 0]
+        out[3:, 3:] = np.eye(3) - np.outer(axis, axis)
+    return out
+
+
+def _top(line: Line) -> Array:
+    return np.diag([0.0] * 3 + [0.0 if line.top_clamped else 1.0] * 3)
+
+
+@kernel
+def _cholesky(diagonal, upper):
+    """Block Cholesky factors in place; False where a pivot is not positive."""
+    n = diagonal.shape[0]
+    for k in range(n):
+        a = diagonal[k]
+        for j in range(SIZE):
+            value = a[j, j]
+            for m in range(j):
+                value -= a[j, m] * a[j, m]
+            if not value > 0.0:
+                return False
+            a[j, j] = math.sqrt(value)
+            for i in range(j + 1, SIZE):
+                value = a[i, j]
+                for m in range(j):
+                    value -= a[i, m] * a[j, m]
+                a[i, j] = value / a[j, j]
+        if k == n - 1:
+            break
+        b = upper[k]
+        for j in range(SIZE):
+            for i in range(SIZE):
+                value = b[i, j]
+                for m in range(i):
+                    value -= a[i, m] * b[m, j]
+                b[i, j] = value / a[i, i]
+        for i in range(SIZE):
+            for j in range(SIZE):
+                for m in range(SIZE):
+                    diagonal[k + 1, i, j] -= b[m, i] * b[m, j]
+    return True

@@ -1,0 +1,71 @@
+"""Pipe and vessel FMUs on the bond: finite rotations, order in the macro step, and the same answer as both solved as one."""
+
+import numpy as np
+import pytest
+
+from master import scene
+from master.drive import open_drive, pose_gap
+from master.monolithic import march
+from master.prepared import prepare
+
+SMALL = ["pipe.nodes=12", "simulation.recording_step=100", "simulation.snapshots=[]"]
+MOVED = ["environment.current.start=0", "environment.current.ramp=2", "vessel.controller.start=300", "vessel.hang_off=[-20.0, 3.0, 2.0]"]
+
+
+def moving(name, changes, step, duration):
+    return scene.load(name, [*SMALL, *changes, f"simulation.macro_step={step}", f"simulation.duration={duration}"])
+
+
+def test_two_turns_of_yaw_and_a_roll_of_sixty_degrees_leave_no_gap_and_a_closed_ledger():
+    """A pinned pipe held 20 m off the centre; the vessel is thrown into a spin by a moment in roll and yaw, then let go."""
+    push = (
+        "tables.environment=[{time=0, moment=[0,0,0]}, {time=2, moment=[1.5e8,0,3e9]}, {time=8, moment=[0,0,3e9]}, "
+        "{time=30, moment=[0,0,3e9]}, {time=31}]"
+    )
+    changes = ['pipe.top="pinned"', "vessel.hang_off=[-20.0, 3.0, 2.0]", push, "start.release={}", 'coupling.on_violation="stop"']
+    loaded = moving("free-decay", changes, 0.1, 40.0)
+    with open_drive(loaded.sections, prepare(loaded)) as drive:
+        gap, turned, heeled, before = 0.0, 0.0, 0.0, 0.0
+        vessel = drive.units["vessel"]
+        while drive.time < 40.0:
+            drive.advance(40.0)
+            roll, yaw = vessel.get(("roll", "yaw"))
+            turned += (yaw - before + np.pi) % (2 * np.pi) - np.pi
+            before, heeled = yaw, max(heeled, abs(roll))
+            gap = max(gap, pose_gap(drive.units["pipe"], vessel, False)["pose_gap", "m"])
+        assert abs(turned) >= 4.0 * np.pi
+        assert heeled >= np.radians(60.0)
+        assert gap <= 1e-9
+        assert drive.ledger.largest_closure <= 1e-8 * drive.ledger.exchanged
+        assert drive.ledger.interface_residual <= 1e-8 * drive.ledger.exchanged
+
+
+def final(step, duration=2.0):
+    loaded = moving("paper", MOVED, step, duration)
+    with open_drive(loaded.sections, prepare(loaded)) as drive:
+        while drive.time < duration:
+            drive.advance(duration)
+        assert drive.effort.rejected_steps == 0
+        pipe, vessel = drive.units["pipe"], drive.units["vessel"]
+        names = ("node_position", "node_tension", "end_moment")
+        return {name: pipe.get(name) for name in names} | {"position": vessel.get("position")}
+
+
+def test_positions_tension_and_top_moment_are_second_order_in_the_macro_step():
+    coarse, middle, fine, reference = (final(step) for step in (0.1, 0.05, 0.025, 0.003125))
+    for name, exact in reference.items():
+        size = np.abs(exact).max()
+        errors = [np.abs(run[name] - exact).max() / size for run in (coarse, middle, fine)]
+        orders = np.log2(np.array(errors[:-1]) / errors[1:])
+        assert orders[-1] > 1.8, (name, errors)
+        if name != "end_moment":
+            assert errors[-1] < 1e-4, (name, errors)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.5])
+def test_with_matched_steps_the_fmus_are_pipe_and_vessel_solved_as_one(step):
+    found = final(step, 4.0)
+    loaded = moving("paper", MOVED, step, 4.0)
+    *_, last = march(loaded)[2]
+    np.testing.assert_allclose(found["node_position"].reshape(-1, 3), last.pipe.position, rtol=0.0, atol=1e-9 * 1200.0)
+    np.testing.assert_allclose(found["position"][:2], last.vessel.position[:2], rtol=1e-9, atol=1e-9)

@@ -1,0 +1,182 @@
+"""A scene of any two FMUs from the command line: what it computes, what it refuses, and what an FMU that dies leaves behind."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from units.toys import build_pair
+
+from master.__main__ import main
+
+SCENE = """
+title = "A spring and a body"
+[simulation]
+duration = 5.0
+macro_step = 0.1
+[units.coil]
+fmu = "spring.fmu"
+parameters = {stiffness = 4.0, damping = 0.1}
+outputs = ["stretch"]
+ENERGY_A
+[units.mass]
+fmu = "body.fmu"
+parameters = {mass = 2.0, start_velocity = [1.0, 0.5, 0.0]}
+outputs = ["position"]
+ENERGY_B
+[bond]
+impedance = "coil"
+mobility = "mass"
+pairs = [
+    {effort = "force", flow = "velocity", floor = 1e-6, end_effort = "end_force", end_flow = "end_velocity"},
+    {effort = "moment", flow = "angular_velocity", floor = 1e-8},
+]
+"""
+ENERGY = {
+    "ENERGY_A": 'energy = {stored = ["kinetic_energy", "elastic_energy"], dissipated = ["drag_dissipation"], bond = "top_work"}',
+    "ENERGY_B": 'energy = {stored = ["kinetic_energy", "restoring_energy"], supplied = ["environment_work"], '
+    'dissipated = ["damping_dissipation"], bond = "bond_work"}',
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PIPELAY_CACHE", str(tmp_path_factory.mktemp("cache")))
+        place = tmp_path_factory.mktemp("scene")
+        build_pair(place, failure={"above": 1e9})
+        energy = silent = SCENE
+        for mark, line in ENERGY.items():
+            energy, silent = energy.replace(mark, line), silent.replace(mark, "")
+        (place / "tied.toml").write_text(energy)
+        (place / "silent.toml").write_text(silent)
+        yield place
+
+
+def ran(folder, out, *changes, scene="tied"):
+    code = main(["run", str(folder / f"{scene}.toml"), *(f"--set={change}" for change in changes), "-o", str(out)])
+    return code, json.loads((out / "summary.json").read_text())
+
+
+def columns(out):
+    header = (out / "signals.csv").read_text().partition("\n")[0].split(",")
+    values = np.loadtxt(out / "signals.csv", delimiter=",", skiprows=1)
+    return dict(zip((name.partition(" [")[0] for name in header), values.T, strict=True))
+
+
+def test_it_runs_like_any_other_and_its_ledger_closes(folder, tmp_path, capsys):
+    code, summary = ran(folder, tmp_path)
+    assert code == 0
+    assert summary["ledger_closure_J"] <= 1e-9 * summary["exchanged_energy_J"]
+    assert summary["macro_steps"] == 50
+    assert summary["impedance_solves"] <= 3 * 50
+    found = columns(tmp_path)
+    # damped oscillator 2 x'' + 0.1 x' + 4 x = 0, midpoint rule: second order
+    decay, w = 0.1 / 4.0, np.sqrt(2.0 - (0.1 / 4.0) ** 2)
+    exact = np.exp(-decay * found["time"]) * np.sin(w * found["time"]) / w
+    np.testing.assert_allclose(found["mass.position[1]"], exact, atol=1e-2)
+    np.testing.assert_allclose(found["coil.stretch[2]"], found["mass.position[2]"], atol=1e-13)
+    np.testing.assert_allclose(found["interface_residual_sum"], np.cumsum(np.abs(found["interface_residual"])), rtol=1e-12)
+    assert (tmp_path / "energy.png").read_bytes().startswith(b"\x89PNG")
+    assert "energy check" in capsys.readouterr().out
+
+
+def test_without_reported_energies_the_check_is_the_residual_alone_and_says_so(folder, tmp_path, capsys):
+    code, summary = ran(folder, tmp_path, scene="silent")
+    assert code == 0
+    assert summary["exchanged_energy_J"] > 1.0
+    assert "the units report no energies" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("scene", ["tied", "silent"])
+def test_without_rollback_it_says_that_nothing_is_iterated_and_what_is_left(folder, tmp_path, capsys, scene):
+    named = 'bond.impedance_derivative="impedance"', 'bond.mobility_derivative="mobility"'
+    code, summary = ran(folder, tmp_path, "coupling.rollback=false", "coupling.energy_check=2.0", *named, scene=scene)
+    assert code == 0
+    assert summary["impedance_solves"] == summary["mobility_solves"] == summary["macro_steps"] == 50
+    assert summary["interface_residual_J"] > 1e-6
+    printed = capsys.readouterr().out
+    assert "not iterated" in printed
+    assert f"the bond made {summary['interface_residual_J']:.2g} J" in printed
+
+
+def test_the_check_measures_the_same_for_every_scheme(folder, tmp_path):
+    left = {}
+    for scheme in ("energy-consistent", "serial", "parallel"):
+        code, summary = ran(folder, tmp_path / scheme, f'coupling.scheme="{scheme}"', 'coupling.on_violation="warn"')
+        assert (code == 0) == (scheme == "energy-consistent")
+        found = columns(tmp_path / scheme)
+        made = np.diff(found["coil.top_work"] + found["mass.bond_work"])
+        np.testing.assert_allclose(found["interface_residual"][1:], made, atol=1e-12)
+        left[scheme] = summary["interface_residual_J"] / summary["exchanged_energy_J"]
+    assert left["energy-consistent"] < 1e-9 < 1e-2 < left["serial"] < left["parallel"]
+
+
+MISTAKES = {
+    "no such file": ('units.coil.fmu="none.fmu"', "units.coil.fmu = 'none.fmu': no such file"),
+    "no FMU": ('units.coil.fmu="tied.toml"', "units.coil.fmu = 'tied.toml': "),
+    "unknown unit": ('bond.impedance="cable"', "bond.impedance = 'cable': must be one of coil, mass"),
+    "one unit twice": ('bond.mobility="coil"', "bond.mobility = 'coil': must be another unit"),
+    "unknown port": ('bond.pairs=[{effort="pull", flow="velocity", floor=1}]', "bond.pairs[1].effort = 'pull': unit coil has no such"),
+    "wrong causality": (
+        'bond.pairs=[{effort="velocity", flow="velocity", floor=1}]',
+        "bond.pairs[1].effort = 'velocity': is of causality input in unit coil, must be output",
+    ),
+    "sizes": (
+        'bond.pairs=[{effort="force", flow="kinetic_energy", flow_input="velocity", floor=1}]',
+        "bond.pairs[1]: force has 3 values and kinetic_energy 1; must be equal",
+    ),
+    "no floor": ('bond.pairs=[{effort="force", flow="velocity", floor=0}]', "bond.pairs[1].floor = 0: must be > 0"),
+    "derivative": ('bond.impedance_derivative="force"', "bond.impedance_derivative = 'force': has 3 values, must have 6 x 6"),
+    "recorded": ('units.mass.outputs=["nowhere"]', "units.mass.outputs = 'nowhere': unit mass has no such output"),
+    "parameter": ("units.mass.parameters={weight=1}", "units.mass.parameters.weight = 1: unknown parameter"),
+    "input": ("units.mass.inputs={force=[1]}", "units.mass.inputs.force = [1]: must have 3 values"),
+    "connection": ('connections=[{from="coil.stretch", to="mass.force"}]', "connections[1]: coil.stretch has 6 values and mass.force 3"),
+    "connected unit": ('connections=[{from="x.y", to="mass.force"}]', "connections[1].from = 'x.y': must begin with one of coil, mass"),
+    "pipe": ("pipe={}", "pipe = {}: unknown key; allowed in a scene of two FMUs"),
+    "shapes": ("simulation.recording_step=1", "simulation.recording_step: must be absent"),
+    "refine": ('coupling={on_violation="refine", rollback=false}', "coupling.on_violation = 'refine': must be stop or warn"),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_one_line_and_exit_code_2(folder, tmp_path, capsys, change, message):
+    assert main(["run", str(folder / "tied.toml"), "--set", change, "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"pipelay: {message}")
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_commands_for_a_pipe_refuse_it(folder, capsys):
+    assert main(["statics", str(folder / "tied.toml")]) == 2
+    assert "needs one with [pipe]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["message", "arithmetic", "bug"])
+def test_an_fmu_that_fails_for_good_ends_the_run_with_its_results_so_far(folder, tmp_path, capsys, kind):
+    changes = [f"units.coil.parameters={{stiffness=4.0, 'failure.start'=2.0, 'failure.above'=0.0, 'failure.kind'='{kind}'}}"]
+    code, summary = ran(folder, tmp_path, *changes)
+    assert code == 1
+    assert summary["status"] == "failed"
+    assert summary["duration_s"] == pytest.approx(2.0)
+    assert columns(tmp_path)["time"][-1] == pytest.approx(2.0)
+    assert "planted" in capsys.readouterr().out
+
+
+def test_the_signals_outlive_a_process_that_an_fmu_kills(folder, tmp_path):
+    program = f"""
+import os
+from master.__main__ import main
+from master.fmu import Fmu
+step = Fmu.step
+def dying(fmu, time, length, final=False):
+    if time > 1.95:
+        os._exit(139)
+    step(fmu, time, length, final)
+Fmu.step = dying
+main(["run", {str(folder / "tied.toml")!r}, "-o", {str(tmp_path / "out")!r}])
+"""
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 139
+    np.testing.assert_allclose(columns(tmp_path / "out")["time"], 0.1 * np.arange(21), atol=1e-12)

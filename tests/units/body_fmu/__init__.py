@@ -1,1 +1,0 @@
-"""A rigid body of small motion, standing in for a vessel."""
