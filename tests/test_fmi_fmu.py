@@ -17,7 +17,7 @@ from units.toys import BODY, SPRING, build_pair, spring_recipe
 
 from master.fmi.build import Recipe, build_fmu, bundled_package, cached_fmu
 from master.fmi.description import base_unit
-from master.fmu import Fmu, FmuError, FmuFailed, StepRejected
+from master.fmu import Fmu, FmuError, FmuFailed, StepFailed, StepRejected
 
 FAILING = {"failure": {"above": 1e9}, "sections": [{"share": 0.5, "name": "a <b> & 'c'"}]}
 FLOWS, EFFORTS = ("velocity", "angular_velocity"), ("force", "moment")
@@ -231,7 +231,7 @@ def test_a_failed_step_is_a_discard_with_the_units_words_and_changes_nothing(fil
 
 
 def test_broken_arithmetic_is_a_failed_step_and_a_bug_is_not(files):
-    for kind, error in (("arithmetic", StepRejected), ("bug", FmuFailed)):
+    for kind, error in (("arithmetic", StepRejected), ("bug", StepFailed)):
         with Fmu(files[0]) as fmu:
             fmu.initialize({"failure.above": 0.0, "failure.kind": kind})
             for _ in range(3):  # PythonFMU alone would not survive the second

@@ -4,7 +4,8 @@ Travels inside every exported FMU (relative imports only) and drives any class o
 INPUTS, outputs(), initialize(), step(), output(), state. Answers to the host (see `failure`):
   - a step that does not converge, meets a number that is not finite, or is asked for out of order: logged, discard,
     the unit stands where it stood before;
-  - a refused parameter or initialisation, and a bug: fmi2Fatal with the message, the process lives on.
+  - a refused parameter or initialisation, and a bug: fmi2Error with the message (fmi2Fatal under PythonFMU's own library), the process
+    lives on.
 Statics and everything else that initialisation costs is done when the first output is asked for, or at the end of
 initialisation mode.
 """
