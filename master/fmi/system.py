@@ -1,7 +1,7 @@
 """Files that tell other hosts how pipe and vessel are connected: SSP 1.0, and the pair of the Open Simulation Platform.
 
 Hosts without rollback exchange values once a step. What suits them is the vessel's velocity at the end of its step, held by
-the pipe over the next one, and the pipe's mean pull, held by the vessel: stable for any step the pipe resolves, and of first
+the pipe over the next one, and the pipe's mean pull, held by the vessel: stable where it was tried, and of first
 order. A master that iterates connects the vessel's mean velocity instead (`master.bond`).
 """
 

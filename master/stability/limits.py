@@ -99,7 +99,7 @@ def spectral_radius(scheme: str, spring: SpringUnit, mass: MassUnit, step: float
         done = coupling(scheme, *ends, scalar_bond(), step, TOLERANCE).advance(0.0, step)
         if done.step < step:
             return math.inf  # the step was halved: not this step
-        exchanged = [*done.effort, *done.flow] if explicit else []
+        exchanged = [*spring.output(first), *mass.output(second)] if explicit else []
         columns.append(np.concatenate([spring.state.z, mass.state.z, exchanged]))
     return float(np.abs(np.linalg.eigvals(np.column_stack(columns))).max())
 
