@@ -143,7 +143,8 @@ def test_tangent_of_the_friction_is_the_derivative_by_the_way_slid():
     def sliding(velocities):
         vector, matrix = np.zeros(12), np.zeros((12, 12))
         z, row = np.array([-0.02, 0.01, 0.005]), np.zeros(9)
-        loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, np.array([0.0, 0.5, 1e-3]), z, z, velocities, row, row, True, True, vector, matrix)
+        bed = np.array([0.0, 0.5, 1e-3])
+        loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, bed, z, z, velocities, row, row, True, True, vector, matrix)
         return vector, matrix
 
     _, tangent = sliding(ends)
