@@ -108,14 +108,15 @@ class Table:
 class Shapes:
     """The pipe at the recording instants.
 
-    s (N,) m; time (nt,) s; position (nt, N, 3) m, spatial; tension (nt, N) N; moment (nt, N, 3) N.m and
-    shear (nt, N, 2) N in the components of the section frame t.
+    s (N,) m; time (nt,) s; position (nt, N, 3) m, spatial; effective tension and that of the wall (nt, N) N; moment (nt, N, 3) N.m
+    and shear (nt, N, 2) N in the components of the section frame t.
     """
 
     s: np.ndarray
     time: np.ndarray
     position: np.ndarray
     tension: np.ndarray
+    wall_tension: np.ndarray
     moment: np.ndarray
     shear: np.ndarray
 
@@ -125,7 +126,7 @@ class Shapes:
 
     def write(self, path: Path) -> None:
         """Write as a compressed numpy archive; `t` is the time."""
-        arrays = {name: getattr(self, name) for name in ("s", "position", "tension", "moment", "shear")}
+        arrays = {name: getattr(self, name) for name in ("s", "position", "tension", "wall_tension", "moment", "shear")}
         np.savez_compressed(path, t=self.time, **arrays)
 
 
@@ -187,6 +188,7 @@ class Recorder:
             (
                 pipe.get("node_position").reshape(-1, 3),
                 pipe.get("node_tension"),
+                pipe.get("node_wall_tension"),
                 pipe.get("node_moment").reshape(-1, 3),
                 pipe.get("node_shear").reshape(-1, 2),
             )
@@ -204,5 +206,4 @@ class Recorder:
         """The shapes recorded so far, None where none are kept."""
         if not self._shapes:
             return None
-        position, tension, moment, shear = (np.stack(arrays) for arrays in zip(*self._shapes, strict=True))
-        return Shapes(self._s, np.array(self._times), position, tension, moment, shear)
+        return Shapes(self._s, np.array(self._times), *(np.stack(arrays) for arrays in zip(*self._shapes, strict=True)))

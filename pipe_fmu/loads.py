@@ -46,6 +46,20 @@ def _linked_motion(x, d, bow, moves):
 
 
 @kernel
+def _add_linked(x, d, bow, force, vector):
+    """Add the nodes' share of a force at x, the transpose of `_linked_motion` times the force, to `vector` (12,)."""
+    half = 0.5 * x * (1.0 - x)
+    stretched = scale(half, cross(bow, force))
+    lever = cross(force, d)
+    rolled = scale(0.5 * half, cross(bow, lever))
+    for i in range(3):
+        vector[i] += (1.0 - x) * force[i] - stretched[i]
+        vector[6 + i] += x * force[i] + stretched[i]
+        vector[3 + i] += rolled[i] - half * lever[i]
+        vector[9 + i] += rolled[i] + half * lever[i]
+
+
+@kernel
 def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate, fresh, vector, matrix):
     """Drag on one element into `vector` (12,) (minus the force on the pipe) and, if `fresh`, its tangent into `matrix` (12, 12).
 
@@ -80,11 +94,10 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
         force = scale(0.5 * h, force)
         dissipated += dot(force, v_r)
         supplied -= dot(force, v_c)
-        _linked_motion(x, d, bow, moves)
-        for i in range(12):
-            vector[i] += moves[0, i] * force[0] + moves[1, i] * force[1] + moves[2, i] * force[2]
+        _add_linked(x, d, bow, force, vector)
         if not fresh:
             continue
+        _linked_motion(x, d, bow, moves)
         v_t = dot(v_r, tangent)
         for j in range(3):  # derivative with respect to the spin of t1
             unit = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)

@@ -59,6 +59,10 @@ class Pipe:
         """Largest von Mises stress (n,) [Pa] over the wall at every node."""
         return recovery.von_mises(self.parameters, self.wall, state.position, forces)
 
+    def wall_tension(self, state: PipeState, forces: SectionForces) -> Array:
+        """Force (n,) [N] in the wall at every node."""
+        return recovery.wall_tension(self.parameters, self.wall, state.position, forces)
+
     def largest_bending_moment(self, forces: SectionForces) -> float:
         """Largest bending moment [N m] along the line, between the nodes too."""
         return recovery.largest_bending_moment(self.s, forces)

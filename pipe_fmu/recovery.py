@@ -125,6 +125,20 @@ def wall(parameters: PipeParameters, s: Array) -> Wall:
     return Wall(*np.array(columns).T)
 
 
+def pressures(parameters: PipeParameters, wall: Wall, position: Array) -> tuple[Array, Array]:
+    """Pressure outside and, of what fills the pipe, inside [Pa], (n,) each, at depths below the surface."""
+    environment = parameters.environment
+    depth = np.maximum(0.0, position[:, 2] + environment.depth)
+    return environment.water_density * environment.gravity * depth, wall.contents * depth
+
+
+def wall_tension(parameters: PipeParameters, wall: Wall, position: Array, forces: SectionForces) -> Array:
+    """Force (n,) [N] in the wall: effective tension - p_e A_e + p_i A_i. Nodes of sections without a wall have the effective tension."""
+    outside, inside = pressures(parameters, wall, position)
+    closed = inside * math.pi * wall.inner**2 - outside * wall.displaced
+    return forces.tension + np.where(wall.area > 0.0, closed, 0.0)
+
+
 def von_mises(parameters: PipeParameters, wall: Wall, position: Array, forces: SectionForces) -> Array:
     """Largest von Mises stress (n,) [Pa] over the wall of a tube at every node: tension, bending, torsion and water pressure.
 
@@ -133,12 +147,10 @@ def von_mises(parameters: PipeParameters, wall: Wall, position: Array, forces: S
     """
     if not wall.area.any():
         return np.zeros(len(wall.area))
-    environment = parameters.environment
-    depth = np.maximum(0.0, position[:, 2] + environment.depth)
-    outside, inside = environment.water_density * environment.gravity * depth, wall.contents * depth
+    outside, inside = pressures(parameters, wall, position)
     a, b, area = wall.inner, wall.outer, np.where(wall.area > 0.0, wall.area, np.inf)
     second = np.where(wall.area > 0.0, wall.second_moment, np.inf)
-    axial = (forces.tension - outside * wall.displaced + inside * math.pi * a**2) / area
+    axial = wall_tension(parameters, wall, position, forces) / area
     mean = (inside * a**2 - outside * b**2) * math.pi / area
     largest = np.zeros(len(area))
     for r in (a, b):

@@ -66,6 +66,7 @@ class PipeUnit:
             "s": (n, "m", "arc length of the nodes"),
             "node_position": (3 * n, "m", "positions of the nodes, in e"),
             "node_tension": (n, "N", "effective tension at the nodes"),
+            "node_wall_tension": (n, "N", "force in the wall at the nodes: effective tension less that of the pressures"),
             "node_moment": (3 * n, "N.m", "torque and bending moments at the nodes, material components"),
             "node_shear": (2 * n, "N", "shear forces at the nodes, material components"),
         }
@@ -139,6 +140,7 @@ class PipeUnit:
         end = self._pipe.spatial_top(state, wrench)
         self._memo |= {
             "node_tension": forces.tension,
+            "node_wall_tension": self._pipe.wall_tension(state, forces),
             "node_moment": forces.moment.ravel(),
             "node_shear": forces.shear.ravel(),
             "largest_tension": np.array([forces.tension.max()]),

@@ -58,6 +58,7 @@ class StillDrive:
             s=s,
             node_position=np.column_stack([s, 0 * s, -s]).ravel(),
             node_tension=500.0 + s,
+            node_wall_tension=500.0 + s,
             node_moment=np.zeros(15),
             node_shear=np.zeros(10),
         )

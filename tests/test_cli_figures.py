@@ -21,7 +21,7 @@ def swinging_catenary(nodes: int = 48, instants: int = 301) -> Shapes:
     bending = 1.03e8 * parameter / (parameter**2 + s**2) + 2e5 * np.exp(-s / 20.0) * (parameter / 500.0 - 1.0)
     moment = np.stack([0.0 * bending, bending, 3e4 * np.sin(s / 200.0) * y / 9.0], axis=-1)
     shear = np.gradient(moment[..., 1:], s, axis=1)
-    return Shapes(s, time, np.stack([x, y, z], axis=-1), tension, moment, shear)
+    return Shapes(s, time, np.stack([x, y, z], axis=-1), tension, tension, moment, shear)
 
 
 def energy_history() -> Table:
@@ -66,7 +66,7 @@ def test_without_shapes_only_the_energy_figure_is_drawn(tmp_path):
 
 def test_a_run_of_one_instant_can_be_drawn(tmp_path, shapes):
     table = energy_history()
-    still = Shapes(shapes.s, *(getattr(shapes, n)[:1] for n in ("time", "position", "tension", "moment", "shear")))
+    still = Shapes(shapes.s, *(getattr(shapes, n)[:1] for n in ("time", "position", "tension", "wall_tension", "moment", "shear")))
     assert len(draw_all(tmp_path, Table(table.names, table.units, table.values[:1]), still, [30.0])) == 8
 
 
@@ -86,6 +86,7 @@ def test_shapes_archive_holds_arrays_over_instants_and_nodes(tmp_path, shapes):
             "t": (301,),
             "position": (301, 48, 3),
             "tension": (301, 48),
+            "wall_tension": (301, 48),
             "moment": (301, 48, 3),
             "shear": (301, 48, 2),
         }

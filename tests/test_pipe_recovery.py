@@ -122,9 +122,11 @@ def test_pressure_alone_gives_the_stress_of_a_capped_tube():
     """Zero effective tension, no moments: wall force -p_e A_e, and by Lame sigma = sqrt(3) p b^2 / (b^2 - a^2) inside, exactly."""
     pipe, _, state = started(PipeParameters(top="pinned", top_quaternion=HANGING))
     n = len(pipe.s)
-    got = pipe.von_mises(state, SectionForces(np.zeros(n), np.zeros((n, 2)), np.zeros((n, 3))))
+    slack = SectionForces(np.zeros(n), np.zeros((n, 2)), np.zeros((n, 3)))
+    got = pipe.von_mises(state, slack)
     a, b = P16.radii
     pressure = 1025 * 9.81 * (800 + state.position[:, 2])
+    np.testing.assert_allclose(pipe.wall_tension(state, slack), -pressure * math.pi * b * b, rtol=1e-12)
     np.testing.assert_allclose(got, math.sqrt(3) * pressure * b * b / (b * b - a * a), rtol=1e-10, atol=1e-3)
 
 
