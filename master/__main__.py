@@ -78,6 +78,15 @@ def parser() -> argparse.ArgumentParser:
     which = "oscillator, schueller, quarter-car, manipulator, limits, bodies (default: all)"
     stability.add_argument("cases", nargs="*", metavar="CASE", help=which)
     stability.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("results/stability"), help="folder of the tables")
+
+    hard = command(
+        "hard-cases",
+        commands.hard_cases,
+        "Run the pipe alone where simulations of lines fail, each case at three steps.",
+        "file written: hard-cases.csv; all of it takes a few minutes",
+    )
+    hard.add_argument("cases", nargs="*", metavar="CASE", help="the cases by their names (default: all)")
+    hard.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("results/hard-cases"), help="folder of the table")
     return top
 
 

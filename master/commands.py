@@ -78,6 +78,19 @@ def stability(options: argparse.Namespace) -> int:
     return 0 if kept else 1
 
 
+def hard_cases(options: argparse.Namespace) -> int:
+    """Run the pipe's hard cases; exit code 1 where a step does not keep the energy identity."""
+    folder = _folder(options.output)
+    from master.hard_cases import NAMES, study  # takes a second to import
+
+    for name in options.cases:
+        if name not in NAMES:
+            raise UsageError(f"case = {name!r}: must be one of {', '.join(map(repr, NAMES))}")
+    text, kept = study(options.cases, folder, sys.stderr)
+    _say(f"{text}\ntable in {folder / 'hard-cases.csv'}")
+    return 0 if kept else 1
+
+
 def _folder(path: Path) -> Path:
     """`path`, if it is a folder or can become one."""
     for place in (path, *path.parents):
