@@ -81,7 +81,7 @@ def test_the_motions_start_at_rest_and_arrive():
 
 def test_the_top_turns_about_its_own_axis(hampered, monkeypatch):
     spins = []
-    monkeypatch.setattr(Hampered, "step", lambda self, state, velocity, spin, h: spins.append(spin) or Pipe.step(self, state, velocity, spin, h))
+    monkeypatch.setattr(Hampered, "step", lambda self, state, v, spin, h: spins.append(spin) or Pipe.step(self, state, v, spin, h))
     case = Case("twist", heave_case(nodes=12, top="clamped"), shift((0.0, 0.0, 0.0), 10.0, 4.0 * math.pi), 10.0, (0.5,))
     (outcome,) = run(case)
     _, state = Pipe(case.pipe).start(0.0)
