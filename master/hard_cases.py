@@ -11,7 +11,7 @@ import csv
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TextIO
 
@@ -21,6 +21,7 @@ from tqdm import tqdm
 from pipe_fmu import Pipe, PipeParameters, Seabed, Section
 from pipe_fmu.environment import Current, Environment
 from pipe_fmu.integrator import WORKS, PipeState, StepResult
+from pipe_fmu.so3 import matrix
 
 HALVINGS = 8
 _OF_EXCHANGED, _OF_STORED = 1e-10, 1e-14
@@ -64,7 +65,12 @@ class Case:
 
 @dataclass
 class Outcome:
-    """What became of a case at one step. `closure`: energy made over what the identity allows, the largest of all accepted steps."""
+    """What became of a case at one step.
+
+    halved: steps that did not converge and were halved; corrections: of the accepted steps, given up searches included;
+    closure_over_allowed: energy made in a step over what the identity allows, the largest of all accepted steps;
+    energy_made_over_exchanged: of the whole run, its drift.
+    """
 
     case: str
     step_s: float
@@ -73,14 +79,14 @@ class Outcome:
     halved: int = 0
     mean_corrections: float = 0.0
     most_corrections: int = 0
-    closure: float = 0.0
-    energy_made: float = 0.0  # over the energy exchanged, the whole run
+    closure_over_allowed: float = 0.0
+    energy_made_over_exchanged: float = 0.0
     cpu_s: float = 0.0
 
     @property
     def holds(self) -> bool:
         """Whether every accepted step keeps the identity."""
-        return self.closure <= 1.0
+        return self.closure_over_allowed <= 1.0
 
 
 def run(case: Case) -> Iterator[Outcome]:
@@ -97,8 +103,7 @@ def run(case: Case) -> Iterator[Outcome]:
 
 def _march(case: Case, pipe: Pipe, state: PipeState, h: float) -> Outcome:
     out, corrections, made, exchanged = Outcome(case.name, h), 0, 0.0, 0.0
-    w, x, y, z = state.quaternion[-1]
-    axis = np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)])
+    axis = np.array(matrix(tuple(state.quaternion[-1])))[:, 0]
     start = time.process_time()
     todo = [(k * h, (k + 1) * h) for k in reversed(range(round(case.duration / h)))]
     while todo:
@@ -109,7 +114,7 @@ def _march(case: Case, pipe: Pipe, state: PipeState, h: float) -> Outcome:
             state, made, exchanged = result.state, made + energy, exchanged + traffic
             out.steps, corrections = out.steps + 1, corrections + result.iterations
             out.most_corrections = max(out.most_corrections, result.iterations)
-            out.closure = float(np.maximum(out.closure, abs(energy) / allowed))  # not a number stays one
+            out.closure_over_allowed = float(np.maximum(out.closure_over_allowed, abs(energy) / allowed))  # not a number stays one
             continue
         if b - a < 1.5 * h / 2**HALVINGS:
             out.outcome = f"stopped at {a:.3f} s, residual {result.residual:.1e}"
@@ -118,7 +123,7 @@ def _march(case: Case, pipe: Pipe, state: PipeState, h: float) -> Outcome:
         todo += [(0.5 * (a + b), b), (a, 0.5 * (a + b))]
     out.cpu_s = time.process_time() - start
     out.mean_corrections = corrections / max(out.steps, 1)
-    out.energy_made = abs(made) / exchanged if exchanged else 0.0
+    out.energy_made_over_exchanged = abs(made) / exchanged if exchanged else 0.0
     return out
 
 
@@ -133,7 +138,8 @@ def _balance(pipe: Pipe, old: PipeState, new: PipeState) -> tuple[float, float, 
     change = stored - pipe.energies(old)
     top, works = new.top_work - old.top_work, new.works - old.works
     given = top + works[_CURRENT]
-    made = change.sum() - given + (works.sum() - works[_CURRENT])
+    lost = works.sum() - works[_CURRENT]
+    made = change.sum() - given + lost
     exchanged = np.abs(change).sum() + abs(top) + np.abs(works).sum()
     return float(made), float(exchanged), float(_OF_EXCHANGED * exchanged + _OF_STORED * np.abs(stored).sum())
 
@@ -148,9 +154,9 @@ def cases() -> tuple[Case, ...]:
     at_800 = Environment(depth=810.0, current=Current(velocity=(0.0, 0.8, 0.0)))
     hanging = PipeParameters(section=tube, top="pinned", top_position=(800.0, 0.0, -800.0), top_quaternion=_AS_IT_HANGS, environment=at_800)
     laid = replace(hanging, top_position=(780.0, 0.0, -800.0), seabed=Seabed())
-    vertical = replace(laid, top="clamped", top_position=(300.0, 0.0, -800.0), top_quaternion=_pitch(90.0))
+    vertical = replace(laid, top="clamped", top_position=(470.0, 0.0, -800.0), top_quaternion=_pitch(90.0))
     straight_up = replace(hanging, foot="pinned", top_position=(0.0, 0.0, -800.0), length=800.5)
-    beyond = replace(vertical, top_position=(200.0, 0.0, -800.0), top_quaternion=_pitch(110.0))
+    beyond = replace(vertical, top_position=(450.0, 0.0, -800.0), top_quaternion=_pitch(110.0))
     behind = replace(hanging, foot="pinned", top_position=(-300.0, 0.0, -800.0), length=900.0)
     reversing = Environment(depth=810.0, current=Current(velocity=(0.0, 0.8, 0.0), period=5.0))
     deep = Environment(depth=3000.0, current=Current(velocity=(0.0, 0.8, 0.0)))
@@ -159,10 +165,10 @@ def cases() -> tuple[Case, ...]:
         hanging, section=nearly_weightless, length=200.0, top="clamped", top_position=(196.0, 0.0, -20.0), environment=near
     )
     uneven = (0.0, *(100.0 * k for k in range(1, 6)), 500.1, *(500.1 + 99.99 * k for k in range(1, 7)), 1200.0)
-    lying = replace(laid, top_position=(1199.0, 0.0, -0.01), environment=Environment(depth=100.0))
+    lying = replace(laid, top_position=(1199.9999, 0.0, -0.01), environment=Environment(depth=100.0))
     return (
         Case("J-lay, top vertical", vertical, heave),
-        Case("vertical line, pinned foot", straight_up, heave),
+        Case("vertical line, pinned foot", straight_up, swing(1.0, 12.0)),
         Case("top beyond vertical, 110 degrees", beyond, heave),
         Case("top behind the foot", behind, heave),
         Case("ten turns of end twist", replace(hanging, top="clamped"), shift((0.0, 0.0, 0.0), 40.0, 20.0 * math.pi)),
@@ -175,7 +181,7 @@ def cases() -> tuple[Case, ...]:
         Case("top moved 50 m in a second", hanging, shift((-30.0, 40.0, 0.0), 1.0), 20.0),
         Case("0.1 m beside 100 m", replace(hanging, nodes=len(uneven), nodes_at=uneven), heave),
         Case("an hour without drag", replace(hanging, section=no_drag, nodes=12), swing(2.0, 12.0, until=36.0), 3600.0, (0.5, 1.0, 2.0)),
-        Case("lying line lifted", lying, shift((0.0, 0.0, -40.0), 40.0)),
+        Case("lying line lifted", lying, shift((-10.0, 0.0, -40.0), 40.0)),
         Case("foot pinned", replace(hanging, foot="pinned"), heave),
         Case("bed with friction, violent", replace(laid, seabed=Seabed(friction=0.5)), violent),
     )
@@ -194,20 +200,23 @@ def study(names: Sequence[str], folder: Path, stream: TextIO) -> tuple[str, bool
 
     Progress goes to `stream` if it is a terminal.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     wanted = [case for case in cases() if case.name in names or not names]
-    progress = tqdm(total=sum(len(case.steps_s) for case in wanted), file=stream, disable=not stream.isatty(), leave=False, unit="run")
-    outcomes = []
-    with progress:
+    total = sum(len(case.steps_s) for case in wanted)
+    outcomes: list[Outcome] = []
+    folder.mkdir(parents=True, exist_ok=True)
+    with (
+        (folder / "hard-cases.csv").open("w", newline="", encoding="utf-8") as file,
+        tqdm(total=total, file=stream, disable=not stream.isatty(), leave=False, unit="run") as progress,
+    ):
+        writer = csv.DictWriter(file, [column.name for column in fields(Outcome)])
+        writer.writeheader()
         for case in wanted:
             progress.set_description(case.name)
             for outcome in run(case):
                 outcomes.append(outcome)
+                writer.writerow(asdict(outcome))
+                file.flush()
                 progress.update()
-    with (folder / "hard-cases.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(asdict(outcomes[0])))
-        writer.writeheader()
-        writer.writerows(asdict(outcome) for outcome in outcomes)
     return _table(outcomes), all(outcome.holds for outcome in outcomes)
 
 
@@ -219,10 +228,10 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     )
     rows = [
         f"{o.case:32} {o.step_s:6g}  {o.outcome:{width}} {o.steps:5d} {o.halved:6d} {o.mean_corrections:5.1f} {o.most_corrections:4d} "
-        f"{o.closure:15.3f} {o.energy_made:14.1e} {o.cpu_s:6.1f}{'' if o.holds else '  NOT KEPT'}"
+        f"{o.closure_over_allowed:15.3f} {o.energy_made_over_exchanged:14.1e} {o.cpu_s:6.1f}{'' if o.holds else '  NOT KEPT'}"
         for o in outcomes
     ]
     converged = sum(o.outcome == "converged" for o in outcomes)
     broken = sum(not o.holds for o in outcomes)
-    kept = "in every accepted step" if not broken else f"NOT in {broken} runs"
-    return "\n".join([head, *rows, "", f"{converged} of {len(outcomes)} runs converged; the energy identity is kept {kept}"])
+    kept = f"NOT kept in {broken}" if broken else "kept in every accepted step"
+    return "\n".join([head, *rows, "", f"{converged} of {len(outcomes)} runs converged; the energy identity is {kept}"])
