@@ -161,10 +161,8 @@ def cases() -> tuple[Case, ...]:
     reversing = Environment(depth=810.0, current=Current(velocity=(0.0, 0.8, 0.0), period=5.0))
     deep = Environment(depth=3000.0, current=Current(velocity=(0.0, 0.8, 0.0)))
     near = Environment(depth=100.0, current=Current(velocity=(0.0, 0.2, 0.0)))
-    short = replace(
-        hanging, section=nearly_weightless, length=200.0, top="clamped", top_position=(196.0, 0.0, -20.0), environment=near
-    )
-    uneven = (0.0, *(100.0 * k for k in range(1, 6)), 500.1, *(500.1 + 99.99 * k for k in range(1, 7)), 1200.0)
+    short = replace(hanging, section=nearly_weightless, length=200.0, top="clamped", top_position=(196.0, 0.0, -20.0), environment=near)
+    uneven = (0.0, *(100.0 * k for k in range(1, 6)), 500.1, *(500.1 + 100.0 * k for k in range(1, 7)), 1200.0)
     lying = replace(laid, top_position=(1199.9999, 0.0, -0.01), environment=Environment(depth=100.0))
     return (
         Case("J-lay, top vertical", vertical, heave),
