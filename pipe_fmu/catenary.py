@@ -8,12 +8,15 @@ from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 
+LEAST_HEIGHT = 1e-6  # of the length: a top on the bed
+
 
 def parameter(length: float, distance: float, height: float, on_bed: bool) -> tuple[float, float]:
     """Horizontal force over weight per length, c [m], and length lying on the bed [m] of an inextensible line.
 
     The line has `length`, its top lies `distance` ahead of and `height` above its foot. With `on_bed` it does not hang below the foot.
     """
+    height = max(height, LEAST_HEIGHT * length)
     chord = math.sqrt(max(length**2 - height**2, 0.0))
     distance = max(distance, 1e-6 * length)
     ratio = chord / distance
@@ -41,6 +44,7 @@ def _sinhc(q: float) -> float:
 def shape(s: Array, length: float, top: tuple[float, float, float], on_bed: bool) -> tuple[Array, Array]:
     """Positions (n, 3) [m] and attitudes (n, 4) of the sections at arc lengths `s` (n,) of a line from the origin to `top`, in e."""
     distance, height, heading = math.hypot(top[0], top[1]), -top[2], math.atan2(top[1], top[0])
+    height = max(height, LEAST_HEIGHT * length)
     c, lying = parameter(length, distance, height, on_bed)
     if lying > 0.0:
         hung = np.maximum(s - lying, 0.0)

@@ -165,7 +165,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
                 gap = max(gap, math.fabs(wanted[i]))
         hold_foot_residual(line, quaternion, (x[0, 3], x[0, 4], x[0, 5]), residual)
         size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
-        done = gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous))
+        done = gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous and share == 1.0))
         if done and iteration > 0:
             return True, x, new_strain, force, tangent, works, iteration, size
         if careful and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:

@@ -259,3 +259,10 @@ def test_nearly_vertical_pipe_agrees_with_the_boundary_value_problem():
     solution = reference.solve(reference.TUBES["P16"], 850.0, 100.0, 800.0, angle, bed=True, tolerance=1e-6)
     assert found.stable
     assert relative(found.top[:3], solution.at([850.0])[2][:, 0]) < 1e-4
+
+
+def test_line_lying_on_the_bed_with_its_top_on_it_is_carried_by_the_bed():
+    """Top at z = 0: no catenary hangs there; the bed carries every node at z = 0, the ends nothing of the weight."""
+    pipe, found, _ = started(PipeParameters(top="pinned", top_quaternion=HANGING, top_position=(1199.99, 0.0, 0.0), seabed=Seabed()))
+    assert abs(found.top[2]) < 1e-9 * (pipe.line.weight @ pipe.line.length)
+    assert abs(found.position[:, 2]).max() < 1e-9
