@@ -1,7 +1,7 @@
 """Geometrically exact submerged pipe as a co-simulation unit.
 
 `Pipe` computes, `PipeUnit` names the ports. Modules, from the facade down:
-slave, pipe, model (mesh, catenary), statics, integrator (newton,
+slave, pipe, model (mesh, catenary), statics (stability), integrator (newton,
 step_kernel, node_kernel, static_kernel), loads (hydrodynamics, seabed), recovery, energy, element, assembly, block_tridiagonal, so3.
 """
 
