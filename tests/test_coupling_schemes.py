@@ -140,7 +140,7 @@ def test_a_step_that_fails_at_every_length_ends_the_coupling_with_the_fmus_words
 def test_a_bug_in_an_fmu_is_met_with_half_the_step_once(files):
     spring = {"failure.above": 0.0, "failure.kind": "bug"}
     with tied(files, spring, PUSH, 0.1) as pair:
-        with pytest.raises(CouplingFailed, match="step of 0.05 s at 0 s: RuntimeError: planted bug, 100 % certain"):
+        with pytest.raises(CouplingFailed, match=r"step of 0\.05 s at 0 s: RuntimeError: planted bug, 100 % certain"):
             pair.run(0.1, 1.0)
         assert pair.coupling.counters.rejected_steps == 2
 
