@@ -75,9 +75,7 @@ def parser() -> argparse.ArgumentParser:
         "Run the coupling's stability cases; write their tables and a stability map.",
         "files written: published.csv, limits.csv, stability_map.csv, stability_map.png, bodies.csv; all of it takes about ten minutes",
     )
-    which = "oscillator, schueller, quarter-car, manipulator, limits, bodies (default: all)"
-    stability.add_argument("cases", nargs="*", metavar="CASE", help=which)
-    stability.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("results/stability"), help="folder of the tables")
+    _study_arguments(stability, "oscillator, schueller, quarter-car, manipulator, limits, bodies")
 
     hard = command(
         "hard-cases",
@@ -85,8 +83,7 @@ def parser() -> argparse.ArgumentParser:
         "Run the pipe alone where simulations of lines fail, each case at three steps.",
         "file written: hard-cases.csv; all of it takes a few minutes",
     )
-    hard.add_argument("cases", nargs="*", metavar="CASE", help="the cases by their names (default: all)")
-    hard.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("results/hard-cases"), help="folder of the table")
+    _study_arguments(hard, "the cases by their names")
     return top
 
 
@@ -97,6 +94,12 @@ def _scene_arguments(to: argparse.ArgumentParser, *, optional: bool) -> None:
     else:
         to.add_argument("scene", metavar="SCENE", help=short)
     _set_argument(to)
+
+
+def _study_arguments(to: argparse.ArgumentParser, cases: str) -> None:
+    to.add_argument("cases", nargs="*", metavar="CASE", help=f"{cases} (default: all)")
+    folder = Path("results") / to.prog.split()[-1]
+    to.add_argument("-o", "--output", metavar="DIR", type=Path, default=folder, help="folder of the tables")
 
 
 def _set_argument(to: argparse.ArgumentParser) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import sys
 import tempfile
@@ -67,27 +68,23 @@ def scenes(options: argparse.Namespace) -> int:
 
 def stability(options: argparse.Namespace) -> int:
     """Run the stability cases; exit code 1 where a limit is not kept."""
-    folder = _folder(options.output)
-    from master.stability.study import NAMES, study  # takes a second to import
-
-    for name in options.cases:
-        if name not in NAMES:
-            raise UsageError(f"case = {name!r}: must be one of {', '.join(NAMES)}")
-    text, kept = study(options.cases, folder, sys.stderr)
-    _say(f"{text}\ntables in {folder}")
-    return 0 if kept else 1
+    return _study(options, "master.stability.study")
 
 
 def hard_cases(options: argparse.Namespace) -> int:
     """Run the pipe's hard cases; exit code 1 where a step does not keep the energy identity."""
-    folder = _folder(options.output)
-    from master.hard_cases import NAMES, study  # takes a second to import
+    return _study(options, "master.hard_cases")
 
+
+def _study(options: argparse.Namespace, module: str) -> int:
+    """Run the cases of a module that has NAMES and `study`; it takes a second to import."""
+    folder = _folder(options.output)
+    cases = importlib.import_module(module)
     for name in options.cases:
-        if name not in NAMES:
-            raise UsageError(f"case = {name!r}: must be one of {', '.join(map(repr, NAMES))}")
-    text, kept = study(options.cases, folder, sys.stderr)
-    _say(f"{text}\ntable in {folder / 'hard-cases.csv'}")
+        if name not in cases.NAMES:
+            raise UsageError(f"case = {name!r}: must be one of {', '.join(map(repr, cases.NAMES))}")
+    text, kept = cases.study(options.cases, folder, sys.stderr)
+    _say(f"{text}\ntables in {folder}")
     return 0 if kept else 1
 
 

@@ -51,22 +51,14 @@ class SpringUnit:
     def __init__(self, parameters: Spring) -> None:
         self.p = parameters
         self.k = np.array([parameters.stiffness] * 3 + [parameters.turning] * 3)
-        self._state: State
+        self.state: State
 
     def initialize(self, time: float, inputs: dict[str, np.ndarray]) -> str | None:
         x = np.array([*self.p.offset, 0.0, 0.0, 0.0])
         if x[0] > 900.0:
             return f"statics: no equilibrium at a stretch of {x[0]:g} m (100 % of it)"
-        self._state = State(x, np.zeros(6), self._force(x, x), np.diag(self.k), 0.0, 0.0)
+        self.state = State(x, np.zeros(6), self._force(x, x), np.diag(self.k), 0.0, 0.0)
         return None
-
-    @property
-    def state(self) -> State:
-        return self._state
-
-    @state.setter
-    def state(self, value: State) -> None:
-        self._state = value
 
     def _cubic(self, old: np.ndarray, new: np.ndarray) -> np.ndarray:
         if self.p.compiled:
@@ -86,19 +78,19 @@ class SpringUnit:
             if planted.kind == "arithmetic":
                 raise FloatingPointError("invalid value encountered in a planted place")
             return "planted failure: residual 1.0 after 20 iterations, 50 % left"
-        old, v = self._state.x, np.concatenate([inputs["velocity"], inputs["angular_velocity"]])
+        old, v = self.state.x, np.concatenate([inputs["velocity"], inputs["angular_velocity"]])
         new = old + h * v
-        end = 2 * v - self._state.v if self.p.inertia else v
-        force = self._force(old, new) + self.p.damping * v + self.p.inertia * (end - self._state.v) / h
+        end = 2 * v - self.state.v if self.p.inertia else v
+        force = self._force(old, new) + self.p.damping * v + self.p.inertia * (end - self.state.v) / h
         slope = self.k / 2 + self.p.hardening * 0.25 * (old**2 + 2 * old * new + 3 * new**2)
         diagonal = h * slope + self.p.damping + 2 * self.p.inertia / h
-        work = self._state.top_work + h * force @ v
-        lost = self._state.drag_dissipation + h * self.p.damping * v @ v
-        self._state = State(new, end, force, np.diag(diagonal), work, lost)
+        work = self.state.top_work + h * force @ v
+        lost = self.state.drag_dissipation + h * self.p.damping * v @ v
+        self.state = State(new, end, force, np.diag(diagonal), work, lost)
         return None
 
     def output(self, name: str) -> np.ndarray:
-        s, p = self._state, self.p
+        s, p = self.state, self.p
         if name in ("force", "moment"):
             pull = -np.roll(s.mean_force, 1) if p.swap else -p.gain * s.mean_force
             return pull[:3] if name == "force" else pull[3:]

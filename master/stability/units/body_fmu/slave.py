@@ -88,37 +88,29 @@ class BodyUnit:
         self.m = np.array([parameters.mass] * 3 + [parameters.inertia] * 3)
         self.load = np.array([*parameters.load, *parameters.holding_moment])
         self.shaking = np.array([*parameters.shaking_force, *parameters.shaking_moment])
-        self._state: State
+        self.state: State
 
     def initialize(self, time: float, inputs: dict[str, np.ndarray]) -> str | None:
         v = np.array([*self.p.start_velocity, *self.p.start_rotation])
-        self._state = State(np.zeros(6), np.array(self.p.start_quaternion), v, v, 0.0, 0.0, 0.0, 0.0)
+        self.state = State(np.zeros(6), np.array(self.p.start_quaternion), v, v, 0.0, 0.0, 0.0, 0.0)
         return None
 
-    @property
-    def state(self) -> State:
-        return self._state
-
-    @state.setter
-    def state(self, value: State) -> None:
-        self._state = value
-
     def step(self, time: float, h: float, inputs: dict[str, np.ndarray]) -> str | None:
-        s, p = self._state, self.p
+        s, p = self.state, self.p
         pull = np.concatenate([inputs["force"], inputs["moment"]])
         rate = 2.0 * np.pi / p.period
         load = self.load + self.shaking * (np.sin(rate * (time + h)) - np.sin(rate * time)) / (rate * h)
         mean = (2 * self.m * s.v / h + pull + load - p.stiffness * s.x) / self._stiffness(h)
         work = (h * pull @ mean, h * load @ mean, h * p.damping * mean @ mean)
         totals = (s.bond_work + work[0], s.environment_work + work[1], s.damping_dissipation + work[2])
-        self._state = State(s.x + h * mean, _turned(s.quaternion, h * mean[3:]), 2 * mean - s.v, mean, h, *totals)
+        self.state = State(s.x + h * mean, _turned(s.quaternion, h * mean[3:]), 2 * mean - s.v, mean, h, *totals)
         return None
 
     def _stiffness(self, h: float) -> np.ndarray:
         return 2 * self.m / h + self.p.damping + self.p.stiffness * h / 2
 
     def output(self, name: str) -> np.ndarray:
-        s = self._state
+        s = self.state
         if name in ("velocity", "angular_velocity"):
             return s.mean[:3] if name == "velocity" else s.mean[3:]
         if name in ("end_velocity", "end_angular_velocity"):
