@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from master.bond import end_value_ends, impedance_end, mobility_end
 from master.coupling import coupling
-from master.drive import Row, snapped
+from master.drive import OnBond, Row
 from master.fmu import Fmu
 from master.ledger import Ledger
 from master.recorder import Signal
@@ -25,7 +25,7 @@ class Effort:
     mobility_solves: int
 
 
-class Bonded:
+class Bonded(OnBond):
     """Two initialised FMUs; see `master.drive.Drive`."""
 
     def __init__(self, scene: General, wiring: Wiring) -> None:
@@ -47,11 +47,6 @@ class Bonded:
         self._coupling = coupling(rules.scheme, *self._ends, bond, self._macro_step, rules.tolerance, self.ledger.check)
 
     @property
-    def scheme(self) -> str:
-        """The coupling in words."""
-        return self._coupling.words
-
-    @property
     def effort(self) -> Effort:
         """What it cost so far."""
         done = self._coupling.counters
@@ -61,8 +56,7 @@ class Bonded:
         """Take one step, not beyond `end` [s]; the further connections hold what they carry now."""
         for source, output, target, name in self._wires:
             target.set(name, source.get(output))
-        step = self._coupling.advance(self.time, end - self.time)
-        self.time = snapped(step.time + step.step, self._macro_step, end)
+        super().advance(end)
 
     def derived(self) -> Row:
         """Nothing beside the ports."""

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from master.bond import end_value_ends, impedance_end, mobility_end
-from master.coupling import SMALLEST_STEP, Step, coupling
+from master.coupling import SMALLEST_STEP, EnergyConsistent, Explicit, OneSolve, Step, coupling
 from master.fmu import Fmu, Names, StepRejected
 from master.hang_off import hang_off
 from master.ledger import Columns, Ledger
@@ -61,7 +61,25 @@ class Drive(Protocol):
         """Values to record that no port holds, by (name, unit)."""
 
 
-class Coupled:
+class OnBond:
+    """What every drive with two FMUs on a power bond does alike."""
+
+    time: float
+    _macro_step: float
+    _coupling: EnergyConsistent | OneSolve | Explicit
+
+    @property
+    def scheme(self) -> str:
+        """See `Drive`."""
+        return self._coupling.words
+
+    def advance(self, end: float) -> None:
+        """See `Drive`."""
+        step = self._coupling.advance(self.time, end - self.time)
+        self.time = snapped(step.time + step.step, self._macro_step, end)
+
+
+class Coupled(OnBond):
     """Pipe and vessel, joined at the hang-off point by an energy-consistent bond."""
 
     def __init__(self, pipe: Fmu, vessel: Fmu, sections: Sections) -> None:
@@ -79,20 +97,10 @@ class Coupled:
         self._coupling = coupling(rules.scheme, self._pipe, self._vessel, bond, self._macro_step, rules.tolerance, self.ledger.check)
 
     @property
-    def scheme(self) -> str:
-        """See `Drive`."""
-        return self._coupling.words
-
-    @property
     def effort(self) -> Effort:
         """See `Drive`."""
         done = self._coupling.counters
         return Effort(done.steps, done.rejected_steps, self._pipe.solves, self._vessel.solves)
-
-    def advance(self, end: float) -> None:
-        """See `Drive`."""
-        step = self._coupling.advance(self.time, end - self.time)
-        self.time = snapped(step.time + step.step, self._macro_step, end)
 
     def derived(self) -> Row:
         """See `Drive`."""

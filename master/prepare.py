@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import pipe_fmu
 import vessel_fmu
 from master import statics
 from master.errors import RunError, UsageError
-from master.fmi.build import Recipe, build_fmu, cached_fmu
+from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
 from master.fmi.schema import to_mapping
 from master.scene import from_mapping
 
@@ -35,7 +34,7 @@ def prepare(mapping: dict[str, Any], folder: Path | None) -> dict[str, Any]:
         package = Path(vessel_fmu.__file__).parent
         recipes["vessel"] = Recipe(package, "slave.VesselUnit", to_mapping(at.vessel), experiment=experiment)
     fmus = {
-        name: cached_fmu(recipe, fmu_folder()) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
+        name: cached_fmu(recipe, cache_folder("fmus")) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
         for name, recipe in recipes.items()
     }
     equilibrium: dict[str, Any] = {"top_force_e_N": rest.found.top[:3].tolist(), "top_moment_e_N_m": rest.found.top[3:].tolist()}
@@ -46,18 +45,6 @@ def prepare(mapping: dict[str, Any], folder: Path | None) -> dict[str, Any]:
         "parameters": {name: {} for name in fmus},
         "equilibrium": equilibrium,
     }
-
-
-def fmu_folder() -> Path:
-    """Where FMUs are kept by content. Raises RunError."""
-    chosen = os.environ.get("PIPELAY_CACHE")
-    for place in (Path(chosen) if chosen else Path.home() / ".cache" / "pipelay", Path(tempfile.gettempdir()) / "pipelay"):
-        try:
-            (place / "fmus").mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        return place / "fmus"
-    raise RunError("no folder can be written for the FMUs; set PIPELAY_CACHE to one that can")
 
 
 def main(arguments: list[str]) -> None:

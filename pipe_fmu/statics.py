@@ -207,9 +207,9 @@ def _hung(line: Line, water: Water, s: Array, top: tuple[float, float, float], s
     found = relax(line, water, *_catenary(line, s, top), scales, limit)
     if found.converged and found.stable:
         return found
-    x, y, z = top
-    reach = _HAULED_FROM * math.sqrt(max(float(s[-1]) ** 2 - z * z, 0.0)) / max(math.hypot(x, y), 1e-9)
-    away = (reach * x, reach * y, z) if x or y else (_HAULED_FROM * math.sqrt(max(float(s[-1]) ** 2 - z * z, 0.0)), 0.0, z)
+    heading = math.atan2(top[1], top[0])
+    reach = _HAULED_FROM * math.sqrt(max(float(s[-1]) ** 2 - top[2] ** 2, 0.0))
+    away = (reach * math.cos(heading), reach * math.sin(heading), top[2])
     result = relax(line, water, *_catenary(line, s, away), scales, limit)
     way = np.array(top) - away
     reached, step = 0.0, 1.0 / _HAULS

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from master.prepare import fmu_folder
+from master.fmi.build import cache_folder
 from master.stability import bodies, limits, published, study
 from master.stability.units.body_fmu.slave import Body, BodyUnit
 from master.stability.units.linear_fmu.exact import transition
@@ -15,7 +15,7 @@ from master.stability.units.manipulator_fmu import model
 
 @pytest.fixture(scope="module")
 def cache():
-    return fmu_folder()
+    return cache_folder("fmus")
 
 
 def test_schuellers_oscillator_beats_the_published_implicit_scheme_at_every_step(cache):

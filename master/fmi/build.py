@@ -28,6 +28,7 @@ from xml.etree import ElementTree
 
 from pythonfmu import FmuBuilder
 
+from ..errors import RunError
 from . import loader
 from .document import icon_png, port_table_html
 
@@ -91,9 +92,21 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
             target.write_bytes(text)
         raw = FmuBuilder.build_FMU(entry, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **CAPABILITIES)
         finished = destination.with_name(f".{os.getpid()}_{destination.name}")
-        _finish(Path(raw), finished, _loaders())
+        _finish(Path(raw), finished, cache_folder("loaders"))
         finished.replace(destination)
     return destination
+
+
+def cache_folder(kind: str) -> Path:
+    """Where files of a kind are kept by content: in $PIPELAY_CACHE, else ~/.cache/pipelay. Raises RunError."""
+    chosen = os.environ.get("PIPELAY_CACHE")
+    for place in (Path(chosen) if chosen else Path.home() / ".cache" / "pipelay", Path(tempfile.gettempdir()) / "pipelay"):
+        try:
+            (place / kind).mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        return place / kind
+    raise RunError("no folder can be written for the FMUs; set PIPELAY_CACHE to one that can")
 
 
 def cached_fmu(recipe: Recipe, folder: Path) -> Path:
@@ -147,13 +160,6 @@ def _digest(parts: Mapping[str, str | bytes]) -> str:
         data = content.encode() if isinstance(content, str) else content
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
     return digest.hexdigest()[:12]
-
-
-def _loaders() -> Path:
-    """Where compiled loaders are kept."""
-    chosen = os.environ.get("PIPELAY_CACHE")
-    place = Path(chosen) if chosen else Path.home() / ".cache" / "pipelay"
-    return (place if os.access(place.parent, os.W_OK) else Path(tempfile.gettempdir(), "pipelay")) / "loaders"
 
 
 def _finish(raw: Path, finished: Path, loaders: Path) -> None:

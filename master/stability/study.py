@@ -12,8 +12,7 @@ from typing import Any, TextIO
 from tqdm import tqdm
 
 import pipe_fmu
-from master.fmi.build import Recipe
-from master.prepare import fmu_folder
+from master.fmi.build import Recipe, cache_folder
 from master.stability import bodies, limits, published
 from master.stability.coupled import BODY, built
 
@@ -25,7 +24,7 @@ def study(names: Sequence[str], folder: Path, stream: TextIO) -> tuple[str, bool
     """Run the cases (all if none is named) and write their tables into `folder`; what to print, and whether all limits are kept."""
     wanted = [name for name in NAMES if name in names] or list(NAMES)
     folder.mkdir(parents=True, exist_ok=True)
-    cache, lines, kept = fmu_folder(), [], []
+    cache, lines, kept = cache_folder("fmus"), [], []
     results = [result for name in wanted if name in published.CASES for result in published.CASES[name](cache)]
     if results:
         _write(folder / "published.csv", [{**asdict(r), "holds": r.holds} for r in results])
