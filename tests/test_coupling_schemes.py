@@ -45,6 +45,16 @@ def test_the_bond_makes_no_energy_at_any_mass_ratio(files, mass, hardening, by_p
             assert np.median(counters.rounds) == 2
 
 
+def test_round_off_in_the_length_of_a_step_costs_no_solve(files):
+    solves = []
+    for error in (0.0, 1e-13):
+        with tied(files, {"hardening": 10.0}, {**PUSH, "mass": 50.0}, 0.1) as pair:
+            for i in range(50):
+                pair.coupling.advance(0.1 * i, 0.1 * (1.0 - error * (i % 2)))
+            solves.append(pair.coupling.impedance.solves)
+    assert solves[1] == solves[0]
+
+
 def test_a_linear_step_costs_two_solves_of_the_impedance_end(files):
     with tied(files, {}, {"mass": 50.0, **PUSH}, 0.1) as pair:
         pair.run(0.1, 10.0)
