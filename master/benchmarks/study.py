@@ -39,7 +39,7 @@ def study(names: Sequence[str], folder: Path, stream: TextIO) -> tuple[str, bool
             else:
                 rows, bound = line.sweep(line.CASES[name], progress.update)
                 lines += ["", name, _table(rows)]
-                lines += [f"  uncertainty of the reference: at most {bound[0]:.1e} m, {bound[1]:.1e} N, {bound[2]:.1e} N m (rms)"]
+                lines += [f"  uncertainty of the reference: {bound[0]:.1e} m, {bound[1]:.1e} N, {bound[2]:.1e} N m (rms)"]
                 line.draw(folder / f"{name}.png", name, rows, bound[0])
             _write(folder / f"{name}.csv", rows)
     return "\n".join(lines), all(kept)
