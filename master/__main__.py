@@ -84,6 +84,13 @@ def parser() -> argparse.ArgumentParser:
         "file written: hard-cases.csv; all of it takes a few minutes",
     )
     _study_arguments(hard, "the cases by their names")
+    measured = command(
+        "bench",
+        commands.bench,
+        "Measure CPU time against error, and against the number of nodes.",
+        "files written: CASE.csv, and CASE.png for heave and snap; all of it takes several minutes",
+    )
+    _study_arguments(measured, "heave, snap, nodes")
     return top
 
 

@@ -76,6 +76,11 @@ def hard_cases(options: argparse.Namespace) -> int:
     return _study(options, "master.hard_cases")
 
 
+def bench(options: argparse.Namespace) -> int:
+    """Measure speed against error; exit code 1 where a limit is not kept."""
+    return _study(options, "master.benchmarks.study")
+
+
 def _study(options: argparse.Namespace, module: str) -> int:
     """Run the cases of a module that has NAMES and `study`; it takes a second to import."""
     folder = _folder(options.output)
