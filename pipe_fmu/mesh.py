@@ -1,8 +1,9 @@
 """Where the nodes stand along the pipe.
 
 The element is fourth-order accurate, so its error is spread evenly where the fourth power of its length follows the second derivative of
-the bending moment m(S): the mesh equidistributes |m''|^(1/4), taken from a static solution on a fine mesh, spread over the bending length
-sqrt(EI / T) so that it stays good when the touchdown point or the top moves, and never falling below a tenth of its mean. Before there is a
+the bending moment m(S): the mesh equidistributes |m''|^(1/4), taken from static solutions on a fine mesh (the largest of them all where the
+top has a range), spread over the bending length sqrt(EI / T) so that it stays good when the touchdown point or the top moves, and never
+falling below a tenth of its mean. Before there is a
 solution the clamped ends are refined by their bending length. Sections begin and end at nodes.
 """
 
@@ -48,12 +49,12 @@ def graded(parameters: PipeParameters, tension: tuple[float, float], count: int)
 
 
 def adapted(parameters: PipeParameters, s: Array, moment: Array, bending_length: Array, count: int) -> Array:
-    """Arc lengths S (count + 1,) [m] of a mesh adapted to the bending moments (n, 2) [N m] found at `s` (n,).
+    """Arc lengths S (count + 1,) [m] of a mesh adapted to the bending moments (k, n, 2) [N m] found at `s` (n,) in k poses at rest.
 
-    bending_length (n,): sqrt(EI / T) there [m].
+    bending_length (n,): sqrt(EI / T) there [m], the least of all poses.
     """
-    slope = np.diff(moment, axis=0) / np.diff(s)[:, None]
-    curvature = np.linalg.norm(np.diff(slope, axis=0), axis=1) / (0.5 * (s[2:] - s[:-2]))
+    slope = np.diff(moment, axis=1) / np.diff(s)[:, None]
+    curvature = np.linalg.norm(np.diff(slope, axis=1), axis=2).max(axis=0) / (0.5 * (s[2:] - s[:-2]))
     monitor = np.concatenate([curvature[:1], curvature, curvature[-1:]]) ** (1.0 / _ORDER)
     total = float(np.trapezoid(monitor, s))
     for end, kind in ((0, parameters.foot), (-1, parameters.top)):

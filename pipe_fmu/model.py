@@ -1,5 +1,6 @@
 """From parameters to the discretised line."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -49,12 +50,29 @@ def _mesh(parameters: PipeParameters, count: int) -> Array:
         return mesh.even(parameters, count)
     estimate = estimate_tension(parameters)
     probe = mesh.graded(parameters, estimate, max(count, min(_PROBE * count, _PROBE_LIMIT)))
-    forces = _at_rest(parameters, probe)
-    if forces is None:
+    found = [_at_rest(pose, probe) for pose in _range(parameters)]
+    forces = np.array([one for one in found if one is not None])
+    if not len(forces):
         return mesh.graded(parameters, estimate, count)
-    tension = np.maximum(forces[:, 0], max(1e-3 * float(forces[:, 0].max()), 1e-9))
-    stiffest = max(section.stiffness[3] for section in parameters.all_sections)
-    return mesh.adapted(parameters, probe, forces[:, 4:], np.sqrt(stiffest / tension), count)
+    largest = forces[:, :, :1].max(axis=1)
+    tension = np.maximum(forces[:, :, 0], np.maximum(1e-3 * largest, 1e-9)).max(axis=0)
+    return mesh.adapted(parameters, probe, forces[:, :, 4:], np.sqrt(_stiffest(parameters) / tension), count)
+
+
+def _range(parameters: PipeParameters) -> list[PipeParameters]:
+    """The parameters, and those with the top elsewhere in its range, about a bending length sqrt(EI / T) of the foot apart."""
+    if not parameters.top_range:
+        return [parameters]
+    x, y, z = parameters.top_position
+    distance, heading = math.hypot(x, y), math.atan2(y, x)
+    count = math.ceil(parameters.top_range / math.sqrt(_stiffest(parameters) / max(estimate_tension(parameters)[0], 1e-9)))
+    moves = parameters.top_range * np.arange(-count, count + 1) / count
+    tops = [((distance + move) * math.cos(heading), (distance + move) * math.sin(heading), z) for move in moves]
+    return [replace(parameters, top_position=top, top_range=0.0) for top in tops]
+
+
+def _stiffest(parameters: PipeParameters) -> float:
+    return max(section.stiffness[3] for section in parameters.all_sections)
 
 
 def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
@@ -71,15 +89,19 @@ def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
 
 
 def _characteristics(parameters: PipeParameters) -> Array | None:
-    """What a tolerance is measured by: tension at both ends, largest bending moment, and the end moments beside it."""
+    """What a tolerance is measured by, everywhere in the top's range: tension at both ends, largest bending moment, and the end moments
+    beside it."""
     s = np.array(parameters.nodes_at)
-    solved = _at_rest(parameters, s)
-    if solved is None:
-        return None
-    forces = recovery.SectionForces.of(solved)
-    largest = recovery.largest_bending_moment(s, forces)
-    ends = [largest + float(np.hypot(*forces.moment[at, 1:])) for at in (0, -1)]
-    return np.array([forces.tension[0], forces.tension[-1], largest, *ends])
+    found = []
+    for pose in _range(parameters):
+        solved = _at_rest(pose, s)
+        if solved is None:
+            return None
+        forces = recovery.SectionForces.of(solved)
+        largest = recovery.largest_bending_moment(s, forces)
+        ends = [largest + float(np.hypot(*forces.moment[at, 1:])) for at in (0, -1)]
+        found.append([forces.tension[0], forces.tension[-1], largest, *ends])
+    return np.array(found)
 
 
 def _placed(parameters: PipeParameters, s: Array) -> PipeParameters:

@@ -155,6 +155,7 @@ class PipeParameters:
     top_quaternion: tuple[float, float, float, float] = number(
         (1.0, 0.0, 0.0, 0.0), "1", "start attitude of the top section, scalar first; all zero: as it hangs", min=-1.0, max=1.0
     )
+    top_range: float = number(0.0, "m", "how far the top moves to and from the foot: the mesh suits all of it", min=0.0)
     section: Section = field(default_factory=Section, metadata={"doc": "the section, where there is one"})
     sections: tuple[Section, ...] = field(default=(), metadata={"doc": "sections from foot to top, instead of `section`"})
     internal_damping: float = number(0.0, "s", "Kelvin-Voigt time: viscous section forces are this times C strain rate", min=0.0)
@@ -181,6 +182,10 @@ class PipeParameters:
         distance = math.dist(self.top_position, (0.0, 0.0, 0.0))
         if self.length <= distance:
             raise ValueError(f"length = {self.length:g}: must exceed the distance from foot to top, {distance:.6g} m")
+        farthest = math.hypot(math.hypot(*self.top_position[:2]) + self.top_range, self.top_position[2])
+        if self.top_range > 0.0 and self.length <= farthest:
+            reach = math.sqrt(self.length**2 - self.top_position[2] ** 2) - math.hypot(*self.top_position[:2])
+            raise ValueError(f"top_range = {self.top_range:g}: must be less than {reach:.6g} m, where the line is taut")
         norm = math.hypot(*self.top_quaternion)
         if norm > 0.0 and abs(norm - 1.0) > 1e-6:
             raise ValueError(f"top_quaternion = {self.top_quaternion!r}: must have length 1, or be all zero")

@@ -34,6 +34,7 @@ BAD = [
     (Current, {"profile": "table", "depths": (9.0, 0.0), "factors": (1.0, 0.0)}, r"depths = \(9\.0, 0\.0\): must ascend"),
     (Current, {"ramp": -1.0}, r"ramp = -1: must be >= 0 s"),
     (PipeParameters, {"length": 900.0}, r"length = 900: must exceed the distance from foot to top, 1134\.71 m"),
+    (PipeParameters, {"top_range": 100.0}, r"top_range = 100: must be less than 89\.7082 m, where the line is taut"),
     (PipeParameters, {"nodes": 2}, r"nodes = 2: must be >= 3"),
     (PipeParameters, {"nodes": True}, r"nodes = True: must be a number"),
     (PipeParameters, {"internal_damping": -0.1}, r"internal_damping = -0\.1: must be >= 0 s"),

@@ -102,6 +102,18 @@ def test_a_tolerance_gives_a_mesh_that_keeps_it(tolerance):
     assert len(pipe.s) <= {1e-2: 30, 1e-3: 60, 1e-4: 120}[tolerance]
 
 
+@pytest.mark.parametrize("at", [755.0, 780.0, 792.0, 804.72])
+def test_a_tolerance_is_kept_in_the_whole_range_of_the_top(at):
+    """The touchdown point wanders by a quarter of the line, up to the clamped foot: tensions, largest moment and, beside it, the foot's."""
+    pipe, _, _ = line("P16", 780.0, seabed=Seabed(), top_range=25.0, tolerance=2e-3)
+    there = replace(pipe.parameters, top_position=(at, 0.0, -HEIGHT), top_range=0.0)
+    pipe, _, state = started(there)
+    *errors, foot, _ = accuracy(pipe, state, exact("P16", at, bed=True, tolerance=1e-6))
+    assert max(errors) < 2e-3
+    assert foot < 10 * 2e-3  # relative to as little as a tenth of the largest moment
+    assert len(pipe.s) <= 100
+
+
 @pytest.mark.parametrize(("name", "foot", "distance"), [("P16", "clamped", 780.0), ("P12", "pinned", 780.0), ("P30", "clamped", 560.0)])
 def test_pinned_line_in_a_current_agrees_with_the_boundary_value_problem(name, foot, distance):
     pipe, found, state = line(name, distance, None, 0.8, foot=foot)
