@@ -90,16 +90,22 @@ class EnergyConsistent:
 
     def _attempt(self, time: float, step: float) -> Step:
         flow, effort = self._guess.at(time + step / 2)
-        on_law = abs(step - self._length) > SLIVER * step
-        if on_law:  # Z of another step length is of no use: solve for a first point and take it there
-            effort = self.impedance.solve(time, step, flow)
-            self._length = step
+        fresh = abs(step - self._length) > SLIVER * step  # slopes of another step length are of no use
         free = self.mobility.solve(time, step, effort)
-        if on_law:
-            slope, mobility = self.impedance.derivative(), self.mobility.derivative()
-            self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
+        if fresh:
+            mobility = self.mobility.derivative()
             self._set_mobility(self._differences(self.mobility, time, step, effort, free) if mobility is None else mobility)
         free = free - self._Y @ effort
+        met = self.impedance.meet(time, step, free, self._Y)
+        if met is not None:
+            flow, effort = met
+        elif fresh:
+            effort = self.impedance.solve(time, step, flow)
+        on_law = fresh or met is not None
+        if on_law:
+            slope = self.impedance.derivative()
+            self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
+            self._length = step
         self._converged, believed = False, True
         for rounds in range(1, LAST_ROUND + 1):
             Z, Y = self._Z, self._Y

@@ -63,6 +63,9 @@ class UnitEnd:
         self.unit.step(time, step, {self._held: held})
         return self.unit.output(self._answer)
 
+    def meet(self, time: float, step: float, free: np.ndarray, mobility: np.ndarray) -> None:
+        """See `master.coupling.End`: it cannot."""
+
     def result(self) -> np.ndarray:
         """The value exchanged before the step."""
         return np.array([self._before])
