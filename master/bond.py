@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .fmu import Fmu, Names, StepFailed, StepRejected
+from .fmu import Fmu, Names, StepFailed
 
 Vector = NDArray[Any]
 Matrix = NDArray[Any]
@@ -173,19 +173,15 @@ class FmuEnd:
         return result
 
     def meet(self, time: float, step: float, free: Vector, mobility: Matrix) -> tuple[Vector, Vector] | None:
-        """Step with a flow V that meets V = free + mobility x answer; V and answer, which belong together. None if the FMU cannot or discards.
+        """Step with a flow V that meets V = free + mobility x answer; V and answer, which belong together. None if the FMU cannot.
 
-        Raises FmuFailed, StepFailed.
+        Raises as `solve`.
         """
         if not self._yielding:
             return None
         self.fmu.set(self._yielding, mobility.ravel())
         try:
             answer = self.solve(time, step, free)
-        except StepFailed:
-            raise
-        except StepRejected:
-            return None
         finally:
             self.fmu.set(self._yielding, np.zeros(mobility.size))
         return self.fmu.get(self._met), answer

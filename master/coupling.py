@@ -31,7 +31,8 @@ __all__ = ["Check", "CouplingFailed", "EnergyConsistent", "Explicit", "OneSolve"
 
 DIFFERENCES_ROUNDS = (4, 8)  # rounds after which Z is taken by differences: without ports, and with (one may be wrong)
 LAST_ROUND = 12
-EASY = 3  # rounds after which the step may grow
+EASY = 3  # rounds of an easy step
+PATIENCE = 4  # easy steps in a row after which a halved step grows
 SMALLEST_STEP = 2.0**-12  # of the macro step
 
 
@@ -54,6 +55,7 @@ class EnergyConsistent:
         self._Z = self._Y = self._inertia = np.empty((0, 0))  # the last is Y^-1
         self._length = 0.0  # the step they belong to; 0: none
         self._converged = False
+        self._easy = 0  # steps of the wanted length that took few rounds, in a row
         self._exchanged = 0.0  # so far [J]
 
     def advance(self, time: float, limit: float) -> Step:
@@ -87,6 +89,7 @@ class EnergyConsistent:
             if failures > 1 or step / 2 < SMALLEST_STEP * self.macro_step:
                 raise CouplingFailed(time, step, residual, reason)
             step = self.wanted = step / 2
+            self._easy = 0
 
     def _attempt(self, time: float, step: float) -> Step:
         flow, effort = self._guess.at(time + step / 2)
@@ -115,8 +118,10 @@ class EnergyConsistent:
             gap = held - new_effort
             trial = Step(time, step, new_flow, new_effort, step * float(gap @ new_flow), rounds)
             defect = abs(trial.residual) + step * abs(float(gap @ Y @ gap))
+            if not np.isfinite(defect):
+                break
             self._converged = defect <= self.tolerance * self._energy_scale(trial)
-            if self._converged or not np.isfinite(defect):
+            if self._converged:
                 break
             slope = self.impedance.derivative() if believed else None
             if rounds == DIFFERENCES_ROUNDS[slope is not None]:
@@ -138,8 +143,10 @@ class EnergyConsistent:
         self._exchanged += trial.step * abs(float(trial.effort @ trial.flow))
         self.counters.steps += 1
         self.counters.rounds.append(trial.rounds)
-        if trial.rounds <= EASY and trial.step >= self.wanted:
-            self.wanted = min(2 * self.wanted, self.macro_step)
+        if trial.step >= self.wanted:
+            self._easy = self._easy + 1 if trial.rounds <= EASY else 0
+            if self._easy >= PATIENCE:
+                self.wanted, self._easy = min(2 * self.wanted, self.macro_step), 0
         return trial
 
     def _energy_scale(self, trial: Step) -> float:

@@ -331,10 +331,10 @@ def test_states_are_values_that_no_step_changes():
 
 def test_unit_reports_a_failed_step_in_one_line_and_keeps_its_state():
     unit = PipeUnit(scene("current"))
-    still = {"velocity": np.zeros(3), "angular_velocity": np.zeros(3)}
+    still = {"velocity": np.zeros(3), "angular_velocity": np.zeros(3), "mobility": np.zeros(36)}
     assert unit.initialize(0.0, still) is None
     before = unit.state
-    message = unit.step(0.0, 1.0, {"velocity": np.array([4000.0, 0.0, 0.0]), "angular_velocity": np.array([0.0, 300.0, 0.0])})
+    message = unit.step(0.0, 1.0, still | {"velocity": np.array([4000.0, 0.0, 0.0]), "angular_velocity": np.array([0.0, 300.0, 0.0])})
     assert message is not None
     assert "\n" not in message
     assert "no convergence" in message
