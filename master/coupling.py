@@ -31,6 +31,8 @@ __all__ = ["Check", "CouplingFailed", "EnergyConsistent", "Explicit", "OneSolve"
 
 DIFFERENCES_ROUNDS = (4, 8)  # rounds after which Z is taken by differences: without ports, and with (one may be wrong)
 LAST_ROUND = 12
+FALLING = 0.3  # of the defect of the round before: more is no progress
+ROUND_OFF = 1e-10  # of the product of the magnitudes: without progress below this the ends' own round-off is reached
 EASY = 3  # rounds of an easy step
 PATIENCE = 4  # easy steps in a row after which a halved step grows
 SMALLEST_STEP = 2.0**-12  # of the macro step
@@ -109,7 +111,7 @@ class EnergyConsistent:
             slope = self.impedance.derivative()
             self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
             self._length = step
-        self._converged, believed = False, True
+        self._converged, believed, before = False, True, np.inf
         for rounds in range(1, LAST_ROUND + 1):
             Z, Y = self._Z, self._Y
             held = np.linalg.solve(np.eye(self.bond.size) + Z @ Y, effort + Z @ (flow - free))
@@ -120,9 +122,11 @@ class EnergyConsistent:
             defect = abs(trial.residual) + step * abs(float(gap @ Y @ gap))
             if not np.isfinite(defect):
                 break
-            self._converged = defect <= self.tolerance * self._energy_scale(trial)
+            stalled = defect > FALLING * before and defect <= ROUND_OFF * step * float(np.abs(new_effort) @ np.abs(new_flow))
+            self._converged = stalled or defect <= self.tolerance * self._energy_scale(trial)
             if self._converged:
                 break
+            before = defect
             slope = self.impedance.derivative() if believed else None
             if rounds == DIFFERENCES_ROUNDS[slope is not None]:
                 self._Z = -self._differences(self.impedance, time, step, new_flow, new_effort)

@@ -111,7 +111,7 @@ def test_the_pipe_against_a_body_of_any_mass(rest, mass, state):
     assert found.finished
     assert found.residual <= 1e-6
     assert max(found.gap_m, found.gap_rad) <= 1e-9
-    assert found.solves <= 5.0
+    assert found.solves == 2.0
 
 
 def test_serial_exchange_loses_a_light_body(rest):
@@ -120,11 +120,13 @@ def test_serial_exchange_loses_a_light_body(rest):
     assert found.end_s < 10.0
 
 
-def test_the_states_are_what_they_are_called(rest):
-    pull = {state.name: bodies.run(bodies.Case("energy-consistent", 1e4, 0.2, state, duration=24.0), rest) for state in bodies.STATES}
+@pytest.mark.parametrize("mass", [1e2, 1e4, 1e6, 1e8])
+def test_the_states_are_what_they_are_called(rest, mass):
+    pull = {state.name: bodies.run(bodies.Case("energy-consistent", mass, 0.2, state, duration=24.0), rest) for state in bodies.STATES}
     still = float(np.linalg.norm(rest.pull[:3])) / 1e3
     assert pull["taut"].least_pull > 0.7 * still
     assert pull["slack"].least_pull < 0.15 * still
+    assert pull["snapping"].least_pull < 0.15 * still
     assert pull["snapping"].largest_pull > 2.0 * still
 
 
