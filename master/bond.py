@@ -22,7 +22,6 @@ Matrix = NDArray[Any]
 
 _INCREMENT = 1e3  # floors: flow increment of a difference quotient, far above the units' Newton noise
 _RELATIVE_INCREMENT = 1e-3  # of the effort
-YIELDING = "mobility"  # input of an impedance end that takes the mobility of the other
 
 
 @dataclass(frozen=True)
@@ -214,9 +213,11 @@ class FmuEnd:
             self.commit()
 
 
-def impedance_end(fmu: Fmu, bond: Bond, derivative: str | None = "impedance", rollback: bool = True) -> FmuEnd:
+def impedance_end(
+    fmu: Fmu, bond: Bond, derivative: str | None = "impedance", rollback: bool = True, yielding: str = "mobility"
+) -> FmuEnd:
     """The end that takes flows and returns efforts; its `derivative` port is dF/dV with F = -effort."""
-    yielding = YIELDING if bond.met_flows else ""
+    yielding = yielding if bond.met_flows else ""
     return FmuEnd(
         fmu, bond.flow_inputs, bond.efforts, derivative, -1.0, signs=bond.signs, rollback=rollback, yielding=yielding, met=bond.met_flows
     )

@@ -10,10 +10,16 @@ what it is given. The step is accepted when the bond makes no energy. With F = -
              V, f, V_free = V_new, f_new, V_new - Y f_v
 
 Z and Y follow the ends' ports, where there are such, which makes the iteration Newton's; else Z follows Broyden's update,
-and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap. Where f is linear in V
-the second round is exact; with the extrapolated pair in place of a first solve, that makes two solves of the impedance
-end a step, or one where nothing happens. A step that is not accepted, or that an FMU discards, is tried again with half the
-length, down to a smallest one; a step after which an FMU is in error or answers with NaN is tried again once.
+and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap.
+
+An impedance end that can yield (see `master.bond.FmuEnd.meet`) takes V_free and Y and solves for V and f at once, within its own
+Newton iteration. That replaces the extrapolated pair, and is exact where the mobility end is linear: one more solve, with the V that
+the mobility end answers, then confirms it. Otherwise the second round is exact where f is linear in V. Either way two solves of the
+impedance end make a step; without yielding one does where nothing happens, and more where the extrapolation fails.
+
+A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
+few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. A tolerance below
+the round-off of the ends' answers is met to that round-off: a residual that no longer falls is then accepted.
 """
 
 from __future__ import annotations
