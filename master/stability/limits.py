@@ -109,8 +109,8 @@ def spectral_radius(scheme: str, spring: SpringUnit, mass: MassUnit, step: float
 
 def stability_map(frequencies: np.ndarray = FREQUENCIES, ratios: np.ndarray = RATIOS) -> dict[str, np.ndarray]:
     """Spectral radius (ratios, frequencies) by scheme: ground, spring k, mass, spring k, mass m; k = m = 1, so that the step is the
-    frequency. The first spring leaves the pair no free drift. Drift has the double, defective eigenvalue 1; a round-off e of the forces, eps k H,
-    splits it into 1 +- sqrt(H e / m) = 1 +- H sqrt(k / m) sqrt(eps), real or complex by chance, 1e-5 at 1000, while a run only drifts.
+    frequency. The first spring leaves the pair no free drift: drift has the double, defective eigenvalue 1, which a round-off of eps k H
+    in the forces splits into 1 +- H sqrt(k / m) sqrt(eps), real or complex by chance (1e-5 at 1000), while a run merely drifts.
     """
     found = {scheme: np.empty((len(ratios), len(frequencies))) for scheme in SCHEMES}
     mass = MassUnit(Mass())
