@@ -3,9 +3,9 @@
 - oscillator: B. Rodriguez et al., Multibody Syst. Dyn. 55 (2022), and the linear oscillator of the Laboratorio de Ingenieria Mecanica;
 - manipulator: the same authors' hydraulic manipulator, manoeuvre M1 (units/manipulator_fmu);
 - schueller: V. Schueller's two-mass oscillator; the published implicit figures are those of the midpoint rule;
-- quarter-car: S. Sadjina et al., "Energy conservation and power bonds in co-simulations" (ECCO; arXiv 1602.06434). What its abstract states is
-  relative: errors up to 93 % smaller than those of the same number of constant steps, parallel exchange. So much less than the
-  error of that exchange, run here at the same step, is the figure to be below; no absolute error was to be had.
+- quarter-car: S. Sadjina et al., "Energy conservation and power bonds in co-simulations" (ECCO; arXiv 1602.06434). Its abstract states
+  a relative figure only: errors up to 93 % smaller than those of as many constant steps of parallel exchange. The error of that
+  exchange, run here at the same step, less 93 %, is the figure to be below; no absolute error was to be had.
 """
 
 from __future__ import annotations
