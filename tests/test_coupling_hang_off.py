@@ -59,7 +59,7 @@ def test_displacements_tension_and_top_moment_are_second_order_in_the_macro_step
         values = [run[name] for run in runs]
         exact = values[-1] + (values[-1] - values[-2]) / 3.0
         errors = np.array([np.abs(value - exact).max() for value in values[:-1]]) / np.abs(exact).max()
-        orders = np.log2(errors[:-1] / errors[1:])
+        orders = np.log2(errors[:-1] / errors[1:])[errors[1:] > 1e-8]  # Newton's tolerance shows below that
         assert (np.abs(orders - 2.0) < 0.15).all(), (name, errors, orders)
         assert errors[-1] <= 1e-6, (name, errors)
 
