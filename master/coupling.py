@@ -13,8 +13,9 @@ Z and Y follow the ends' ports, where there are such, which makes the iteration 
 and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap.
 
 An impedance end that can yield (see `master.bond.FmuEnd.meet`) takes V_free and Y and solves for V and f at once, within its own
-Newton iteration. That replaces the extrapolated pair, and is exact where the mobility end is linear (V_free and Y are then taken anew
-at the f found): one more solve, with the V that the mobility end answers, confirms it. Otherwise the second round is exact where f is linear in V. Either way two solves of the
+Newton iteration. That replaces the extrapolated pair, and is exact where the mobility end is linear; V_free and Y are then taken
+anew at the f found. One more solve, with the V that the mobility end answers, confirms it. Otherwise the second round is exact where f
+is linear in V. Either way two solves of the
 impedance end make a step; without yielding one does where nothing happens, and more where the extrapolation fails.
 
 A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
