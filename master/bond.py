@@ -30,7 +30,8 @@ class Pair:
 
     `effort` is an output of the impedance end, `flow` one of the mobility end; the inputs they feed have the same names, or
     `effort_input` and `flow_input`. `end_effort` and `end_flow` are outputs with the values at the end of a step, for the
-    schemes that exchange those. `reverse`: the effort port carries what acts on the impedance end itself.
+    schemes that exchange those. `met_flow` is an output of the impedance end with the flow of its last step, for one that
+    yields, see `FmuEnd.meet`. `reverse`: the effort port carries what acts on the impedance end itself.
     """
 
     effort: str
@@ -41,6 +42,7 @@ class Pair:
     flow_input: str = ""
     end_effort: str = ""
     end_flow: str = ""
+    met_flow: str = ""
     reverse: bool = False
 
 
@@ -80,6 +82,12 @@ class Bond:
         """Names of the flow outputs at the end of a step; the means where there are none."""
         return tuple(pair.end_flow or pair.flow for pair in self.pairs)
 
+    @property
+    def met_flows(self) -> tuple[str, ...]:
+        """Names of the impedance end's outputs with the flows of its last step; empty if one is not named."""
+        names = tuple(pair.met_flow for pair in self.pairs)
+        return names if all(names) else ()
+
     @cached_property
     def signs(self) -> Vector:
         """Factors from the effort outputs to the pull on the mobility end, (size,)."""
@@ -118,7 +126,8 @@ class FmuEnd:
 
     `derivative` names the FMU's port with d(result)/d(held), row by row, times `sign`; without it the FMU's directional
     derivatives serve, where it provides them, else difference quotients. `mean` names the outputs whose product with what
-    the other end holds is the power, by default the result; `signs` are factors on both. Between `begin` and `commit` or
+    the other end holds is the power, by default the result; `signs` are factors on both. `yielding` names the input by which
+    the FMU takes the other end's mobility, `met` its outputs with the flow that it then finds. Between `begin` and `commit` or
     `cancel` every `solve` starts from the same saved state; an end with `rollback` False saves none.
     """
 
@@ -132,10 +141,14 @@ class FmuEnd:
         mean: Names | None = None,
         signs: Vector | float = 1.0,
         rollback: bool = True,
+        yielding: str = "",
+        met: tuple[str, ...] = (),
     ) -> None:
         self.fmu, self._held, self._result, self._sign = fmu, held, result, sign
         self._mean, self._signs = result if mean is None else mean, signs
         self._derivative = derivative if derivative in fmu.ports else None
+        self._yielding = yielding if yielding in fmu.ports and all(name in fmu.ports for name in met) else ""
+        self._met = met
         self.rollback = rollback and fmu.can_rollback
         self._saved: ctypes.c_void_p | None = None
         self._moved = False
@@ -157,6 +170,20 @@ class FmuEnd:
         if not np.isfinite(result).all():
             raise StepFailed(f"{self.fmu.name}: step of {step:.6g} s at {time:.9g} s: answers with a number that is not finite")
         return result
+
+    def meet(self, time: float, step: float, free: Vector, mobility: Matrix) -> tuple[Vector, Vector] | None:
+        """Step with a flow V that meets V = free + mobility x answer; V and answer, which belong together. None if the FMU cannot.
+
+        Raises as `solve`.
+        """
+        if not self._yielding:
+            return None
+        self.fmu.set(self._yielding, mobility.ravel())
+        try:
+            answer = self.solve(time, step, free)
+        finally:
+            self.fmu.set(self._yielding, np.zeros(mobility.size))
+        return self.fmu.get(self._met), answer
 
     def result(self) -> Vector:
         """The conjugate ports as they are."""
@@ -186,9 +213,14 @@ class FmuEnd:
             self.commit()
 
 
-def impedance_end(fmu: Fmu, bond: Bond, derivative: str | None = "impedance", rollback: bool = True) -> FmuEnd:
+def impedance_end(
+    fmu: Fmu, bond: Bond, derivative: str | None = "impedance", rollback: bool = True, yielding: str = "mobility"
+) -> FmuEnd:
     """The end that takes flows and returns efforts; its `derivative` port is dF/dV with F = -effort."""
-    return FmuEnd(fmu, bond.flow_inputs, bond.efforts, derivative, -1.0, signs=bond.signs, rollback=rollback)
+    yielding = yielding if bond.met_flows else ""
+    return FmuEnd(
+        fmu, bond.flow_inputs, bond.efforts, derivative, -1.0, signs=bond.signs, rollback=rollback, yielding=yielding, met=bond.met_flows
+    )
 
 
 def mobility_end(fmu: Fmu, bond: Bond, derivative: str | None = "mobility", rollback: bool = True) -> FmuEnd:

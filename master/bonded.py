@@ -36,7 +36,7 @@ class Bonded(OnBond):
         self._wires, self._macro_step = wiring.connections(), scene.simulation.macro_step
         if rules.scheme == "energy-consistent":
             self._ends = (
-                impedance_end(impedance, bond, table.impedance_derivative or None, rules.rollback),
+                impedance_end(impedance, bond, table.impedance_derivative or None, rules.rollback, table.yielding),
                 mobility_end(mobility, bond, table.mobility_derivative or None, rules.rollback),
             )
         else:

@@ -10,10 +10,17 @@ what it is given. The step is accepted when the bond makes no energy. With F = -
              V, f, V_free = V_new, f_new, V_new - Y f_v
 
 Z and Y follow the ends' ports, where there are such, which makes the iteration Newton's; else Z follows Broyden's update,
-and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap. Where f is linear in V
-the second round is exact; with the extrapolated pair in place of a first solve, that makes two solves of the impedance
-end a step, or one where nothing happens. A step that is not accepted, or that an FMU discards, is tried again with half the
-length, down to a smallest one; a step after which an FMU is in error or answers with NaN is tried again once.
+and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap.
+
+An impedance end that can yield (see `master.bond.FmuEnd.meet`) takes V_free and Y and solves for V and f at once, within its own
+Newton iteration. That replaces the extrapolated pair, and is exact where the mobility end is linear; V_free and Y are then taken
+anew at the f found. One more solve, with the V that the mobility end answers, confirms it. Otherwise the second round is exact where f
+is linear in V. Either way two solves of the
+impedance end make a step; without yielding one does where nothing happens, and more where the extrapolation fails.
+
+A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
+few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. A tolerance below
+the round-off of the ends' answers is met to that round-off: a residual that no longer falls is then accepted.
 """
 
 from __future__ import annotations
@@ -31,7 +38,10 @@ __all__ = ["Check", "CouplingFailed", "EnergyConsistent", "Explicit", "OneSolve"
 
 DIFFERENCES_ROUNDS = (4, 8)  # rounds after which Z is taken by differences: without ports, and with (one may be wrong)
 LAST_ROUND = 12
-EASY = 3  # rounds after which the step may grow
+FALLING = 0.3  # of the defect of the round before: more is no progress
+ROUND_OFF = 1e-10  # of the product of the magnitudes: without progress below this the ends' own round-off is reached
+EASY = 3  # rounds of an easy step
+PATIENCE = 4  # easy steps in a row after which a halved step grows
 SMALLEST_STEP = 2.0**-12  # of the macro step
 
 
@@ -54,6 +64,7 @@ class EnergyConsistent:
         self._Z = self._Y = self._inertia = np.empty((0, 0))  # the last is Y^-1
         self._length = 0.0  # the step they belong to; 0: none
         self._converged = False
+        self._easy = 0  # steps of the wanted length that took few rounds, in a row
         self._exchanged = 0.0  # so far [J]
 
     def advance(self, time: float, limit: float) -> Step:
@@ -87,20 +98,31 @@ class EnergyConsistent:
             if failures > 1 or step / 2 < SMALLEST_STEP * self.macro_step:
                 raise CouplingFailed(time, step, residual, reason)
             step = self.wanted = step / 2
+            self._easy = 0
 
     def _attempt(self, time: float, step: float) -> Step:
         flow, effort = self._guess.at(time + step / 2)
-        on_law = abs(step - self._length) > SLIVER * step
-        if on_law:  # Z of another step length is of no use: solve for a first point and take it there
-            effort = self.impedance.solve(time, step, flow)
-            self._length = step
+        fresh = abs(step - self._length) > SLIVER * step  # slopes of another step length are of no use
         free = self.mobility.solve(time, step, effort)
-        if on_law:
-            slope, mobility = self.impedance.derivative(), self.mobility.derivative()
-            self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
+        if fresh:
+            mobility = self.mobility.derivative()
             self._set_mobility(self._differences(self.mobility, time, step, effort, free) if mobility is None else mobility)
         free = free - self._Y @ effort
-        self._converged, believed = False, True
+        met = self.impedance.meet(time, step, free, self._Y)
+        if met is not None:
+            flow, effort = met
+            free = self.mobility.solve(time, step, effort)
+            if (mobility := self.mobility.derivative()) is not None:
+                self._set_mobility(mobility)
+            free = free - self._Y @ effort
+        elif fresh:
+            effort = self.impedance.solve(time, step, flow)
+        on_law = fresh or met is not None
+        if on_law:
+            slope = self.impedance.derivative()
+            self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
+            self._length = step
+        self._converged, believed, before = False, True, np.inf
         for rounds in range(1, LAST_ROUND + 1):
             Z, Y = self._Z, self._Y
             held = np.linalg.solve(np.eye(self.bond.size) + Z @ Y, effort + Z @ (flow - free))
@@ -109,9 +131,13 @@ class EnergyConsistent:
             gap = held - new_effort
             trial = Step(time, step, new_flow, new_effort, step * float(gap @ new_flow), rounds)
             defect = abs(trial.residual) + step * abs(float(gap @ Y @ gap))
-            self._converged = defect <= self.tolerance * self._energy_scale(trial)
-            if self._converged or not np.isfinite(defect):
+            if not np.isfinite(defect):
                 break
+            stalled = defect > FALLING * before and defect <= ROUND_OFF * step * float(np.abs(new_effort) @ np.abs(new_flow))
+            self._converged = stalled or defect <= self.tolerance * self._energy_scale(trial)
+            if self._converged:
+                break
+            before = defect
             slope = self.impedance.derivative() if believed else None
             if rounds == DIFFERENCES_ROUNDS[slope is not None]:
                 self._Z = -self._differences(self.impedance, time, step, new_flow, new_effort)
@@ -132,8 +158,10 @@ class EnergyConsistent:
         self._exchanged += trial.step * abs(float(trial.effort @ trial.flow))
         self.counters.steps += 1
         self.counters.rounds.append(trial.rounds)
-        if trial.rounds <= EASY and trial.step >= self.wanted:
-            self.wanted = min(2 * self.wanted, self.macro_step)
+        if trial.step >= self.wanted:
+            self._easy = self._easy + 1 if trial.rounds <= EASY else 0
+            if self._easy >= PATIENCE:
+                self.wanted, self._easy = min(2 * self.wanted, self.macro_step), 0
         return trial
 
     def _energy_scale(self, trial: Step) -> float:

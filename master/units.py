@@ -68,24 +68,31 @@ class PairOfPorts(Section):
     flow_input: str = ""
     end_effort: str = ""
     end_flow: str = ""
+    met_flow: str = ""
     reverse: bool = False
 
 
 @dataclass(frozen=True)
 class BondTable:
-    """[bond]; the derivative ports are dF/dV of the impedance unit, F = -effort, and d(flow)/d(effort) of the other."""
+    """[bond]; the derivative ports are dF/dV of the impedance unit, F = -effort, and d(flow)/d(effort) of the other.
+
+    `yielding` is the input by which the impedance unit takes the latter, see `master.bond.FmuEnd.meet`.
+    """
 
     impedance: str
     mobility: str
     pairs: tuple[PairOfPorts, ...]
     impedance_derivative: str = ""
     mobility_derivative: str = ""
+    yielding: str = ""
 
     def __post_init__(self) -> None:
         if self.impedance == self.mobility:
             raise ValueError(f"mobility = {self.mobility!r}: must be another unit than impedance")
         if not self.pairs:
             raise ValueError("pairs = []: must have at least one row")
+        if self.yielding and not all(pair.met_flow for pair in self.pairs):
+            raise ValueError(f"yielding = {self.yielding!r}: must have a met_flow in every pair")
 
 
 @dataclass(frozen=True)
@@ -161,9 +168,14 @@ class Wiring:
         """The bond with the sizes of its ports."""
         table = self.scene.bond
         rows = [self._pair(f"bond.pairs[{i}]", row) for i, row in enumerate(table.pairs, 1)]
-        for key, unit in (("impedance_derivative", table.impedance), ("mobility_derivative", table.mobility)):
+        matrices = (
+            ("impedance_derivative", table.impedance, "output"),
+            ("mobility_derivative", table.mobility, "output"),
+            ("yielding", table.impedance, "input"),
+        )
+        for key, unit, causality in matrices:
             if name := getattr(table, key):
-                port, size = self.port(f"bond.{key}", unit, name, "output"), sum(pair.size for pair in rows)
+                port, size = self.port(f"bond.{key}", unit, name, causality), sum(pair.size for pair in rows)
                 if port.size != size * size:
                     raise UsageError(f"bond.{key} = {name!r}: has {port.size} values, must have {size} x {size}")
         return Bond(tuple(rows))
@@ -177,12 +189,13 @@ class Wiring:
             ("flow_input" if row.flow_input else "flow", row.flow_input or row.flow, table.impedance, "input"),
             ("end_effort", row.end_effort, table.impedance, "output"),
             ("end_flow", row.end_flow, table.mobility, "output"),
+            ("met_flow", row.met_flow, table.impedance, "output"),
         ]
         ports = [self.port(f"{where}.{key}", unit, name, causality) for key, name, unit, causality in asked if name]
         for port in ports[1:]:
             if port.size != ports[0].size:
                 raise UsageError(f"{where}: {ports[0].name} has {ports[0].size} values and {port.name} {port.size}; must be equal")
-        names = (row.effort_input, row.flow_input, row.end_effort, row.end_flow)
+        names = (row.effort_input, row.flow_input, row.end_effort, row.end_flow, row.met_flow)
         return Pair(row.effort, row.flow, row.floor, ports[0].size, *names, row.reverse)
 
     def connections(self) -> list[tuple[Fmu, str, Fmu, str]]:

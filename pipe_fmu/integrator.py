@@ -12,6 +12,7 @@ from .step_kernel import element_strains
 
 MAX_CORRECTIONS = 25
 CAREFUL_CORRECTIONS = 100
+STIFF = np.zeros((6, 6))  # mobility of a top that moves as it is told
 WORKS = ("drag", "current", "rotational", "internal", "contact", "numerical")
 
 
@@ -52,10 +53,11 @@ def rest(line: Line, position: Array, quaternion: Array, time: float) -> PipeSta
     return PipeState(time, position, quaternion, zero, zero, flow, strain, np.zeros((n, 6)), np.zeros((n, 6)), 0.0, np.zeros(len(WORKS)))
 
 
-def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Array, h: float) -> StepResult:
+def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Array, h: float, mobility: Array = STIFF) -> StepResult:
     """One discretely passive step of length h [s] (step_kernel.py).
 
-    water: at the middle of the step; velocity, spin (3,): mean velocity and angular velocity of the top, in e.
+    water: at the middle of the step; velocity, spin (3,): mean velocity and angular velocity of the top, in e; or those that it
+    would have without the pipe, where it yields to the pipe's pull with `mobility` (6, 6), the derivative of the one by the other.
     """
     top = h * np.concatenate([velocity, spin])
     old = state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain
@@ -63,7 +65,7 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     for guess, careful in ((2.0 * state.last - state.before, False), (state.last, True), (np.zeros_like(state.last), True)):
         limit = CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
         converged, x, strain, force, tangent, works, iterations, residual = solve_step(
-            line, water, h, *old, h * guess, top, careful, limit
+            line, water, h, *old, h * guess, top, h * mobility, careful, limit
         )
         spent += iterations
         if converged:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from .block_tridiagonal import SIZE, condense, factorize, lu, lu_solve, substitute
+from .block_tridiagonal import SIZE, condense, factorize, lu, lu_solve, lu_solve_vector, substitute
 from .compiled import kernel
 from .so3 import dot, matrix
 from .step_kernel import step_system
@@ -95,6 +95,35 @@ def top_correction(line, block, right, wanted, move):
 
 
 @kernel
+def yielding(line, block, right, tangent, held, mobility, move):
+    """Correction of the top into `move` (6,) with which it meets held = displacement + mobility x force; False if singular.
+
+    held (6,): displacement from here to where the top would be without a force; mobility (6, 6): displacement over force;
+    tangent: the pipe's, as its top feels it.
+    """
+    a, wanted = np.empty((SIZE, SIZE)), np.zeros(SIZE)
+    pivots, force = np.empty(SIZE, np.int64), np.empty(SIZE)
+    if not top_correction(line, block, right, wanted, move):
+        return False
+    for i in range(SIZE):  # what the top would feel if it stayed; a pinned one turns
+        force[i] = right[i] if line.top_clamped or i < 3 else 0.0
+        if not line.top_clamped and i < 3:
+            for j in range(3, SIZE):
+                force[i] += block[i, j] * move[j]
+    for i in range(SIZE):
+        wanted[i] = held[i]
+        for j in range(SIZE):
+            wanted[i] -= mobility[i, j] * force[j]
+            a[i, j] = 1.0 if i == j else 0.0
+            for k in range(SIZE):
+                a[i, j] += mobility[i, k] * tangent[k, j]
+    if not lu(a, pivots):
+        return False
+    lu_solve_vector(a, pivots, wanted)
+    return top_correction(line, block, right, wanted, move)
+
+
+@kernel
 def condense_top(line, block, out):
     """Tangent d(force, moment) / d(displacement, rotation) at the top into `out` (6, 6); a pinned top has no moment."""
     for i in range(SIZE):
@@ -132,8 +161,11 @@ def _size(residual, force_scale, moment_scale, top_clamped):
 
 
 @kernel
-def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, careful, limit):
-    """Increments (n, 6) of one step with the top's increment `top` (6,) prescribed, from `guess` (n, 6), in at most `limit` corrections.
+def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, mobility, careful, limit):
+    """Increments (n, 6) of one step, from `guess` (n, 6), in at most `limit` corrections.
+
+    The top's increment is `top` (6,) less mobility (6, 6) x the force on it; without a mobility it is prescribed, and met exactly; with
+    one the force is still exactly that of the increment found, but the relation between the two is met to the last correction only.
 
     The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
     is made anew for every further one. A `careful` search makes it anew always, starts with a tangent of friction with which nothing
@@ -154,6 +186,10 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
     fresh, keep = True, True
+    prescribed = True
+    for i in range(SIZE):
+        for j in range(SIZE):
+            prescribed = prescribed and mobility[i, j] == 0.0
     for iteration in range(limit + 1):
         sharp = not careful or size < SHARP
         force_scale, moment_scale = step_system(line, water, h, *old, x, new_strain, fresh, sharp, system, works)
@@ -161,7 +197,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
         for i in range(SIZE):
             force[i] = residual[n - 1, i]
             wanted[i] = top[i] - x[n - 1, i]
-            if line.top_clamped or i < 3:
+            if prescribed and (line.top_clamped or i < 3):
                 gap = max(gap, math.fabs(wanted[i]))
         hold_foot_residual(line, quaternion, (x[0, 3], x[0, 4], x[0, 5]), residual)
         size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
@@ -187,12 +223,16 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             return True, x, new_strain, force, tangent, works, iteration, size
         fresh = careful or not keep
         condense(diagonal, lower, pivots, residual)
-        if not top_correction(line, diagonal[n - 1], residual[n - 1], wanted, move):
+        if prescribed:
+            fine = top_correction(line, diagonal[n - 1], residual[n - 1], wanted, move)
+        else:
+            fine = yielding(line, diagonal[n - 1], residual[n - 1], tangent, wanted, mobility, move)
+        if not fine:
             break
         substitute(upper, residual, move, correction)
         _move(x, 1.0, correction)
         for i in range(SIZE):
-            if line.top_clamped or i < 3:
+            if prescribed and (line.top_clamped or i < 3):
                 x[n - 1, i] = top[i]
         previous = size
     return False, x, new_strain, force, tangent, works, limit, size

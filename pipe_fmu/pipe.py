@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import integrator, model, recovery, statics
-from .integrator import PipeState, StepResult
+from .integrator import STIFF, PipeState, StepResult
 from .line import Array
 from .parameters import PipeParameters
 from .recovery import SectionForces
@@ -36,9 +36,11 @@ class Pipe:
         """State of rest in an equilibrium."""
         return integrator.rest(self.line, found.position, found.quaternion, time)
 
-    def step(self, state: PipeState, velocity: Array, spin: Array, h: float) -> StepResult:
-        """Step of h [s] with the top's mean velocity and angular velocity (3,), e; the water is that of mid-step."""
-        return integrator.step(self.line, model.water(self.parameters, state.time + 0.5 * h), state, velocity, spin, h)
+    def step(self, state: PipeState, velocity: Array, spin: Array, h: float, mobility: Array = STIFF) -> StepResult:
+        """Step of h [s] with the top's mean velocity and angular velocity (3,), e, or those without the pipe of a top that yields to
+        its pull with `mobility` (6, 6); the water is that of mid-step.
+        """
+        return integrator.step(self.line, model.water(self.parameters, state.time + 0.5 * h), state, velocity, spin, h, mobility)
 
     def energies(self, state: PipeState) -> tuple[float, float, float, float]:
         """(kinetic, elastic, gravity, contact) [J]."""

@@ -25,6 +25,8 @@ class PipeUnit:
     INPUTS: ClassVar[dict[str, Port]] = {
         "velocity": (3, "m/s", f"velocity {_MOTION}"),
         "angular_velocity": (3, "rad/s", f"angular velocity {_MOTION}"),
+        "mobility": (36, "", "zero, or what the hang-off point yields to the pull: d(velocities) / d(force, moment), row by row, SI; "
+                     "the velocities are then those without a pull"),
     }
 
     def __init__(self, parameters: PipeParameters) -> None:
@@ -42,6 +44,8 @@ class PipeUnit:
             "moment": (3, "N.m", f"moment {_PULL}, mean over the step"),
             "end_force": (3, "N", f"force {_PULL}, at the end of the step"),
             "end_moment": (3, "N.m", f"moment {_PULL}, at the end of the step"),
+            "top_velocity": (3, "m/s", "velocity of the top, mean over the step, in e"),
+            "top_angular_velocity": (3, "rad/s", "angular velocity of the top, mean over the step, in e"),
             "top_position": (3, "m", "position of the top, in e"),
             "top_quaternion": (4, "1", "attitude of the top section, scalar first"),
             "impedance": (36, "N.s/m", "d(force, moment on the pipe) / d(velocity, angular velocity), row by row; SI"),
@@ -84,7 +88,8 @@ class PipeUnit:
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
         """Advance by h [s]; a message, and the state unchanged, if Newton's method does not converge."""
-        result = self._pipe.step(self.state[0]._replace(time=time), inputs["velocity"], inputs["angular_velocity"], h)
+        motion = inputs["velocity"], inputs["angular_velocity"]
+        result = self._pipe.step(self.state[0]._replace(time=time), *motion, h, np.reshape(inputs["mobility"], (6, 6)))
         if not result.converged:
             return (
                 f"step of {h:g} s at t = {time:g} s: no convergence after {result.iterations} corrections, "
@@ -106,6 +111,8 @@ class PipeUnit:
         memo = self._memo
         if name in ("force", "moment"):
             memo["force"], memo["moment"] = -top[:3], -top[3:]
+        elif name in ("top_velocity", "top_angular_velocity"):
+            memo["top_velocity"], memo["top_angular_velocity"] = state.last[-1, :3], state.last[-1, 3:]
         elif name == "top_position":
             memo[name] = state.position[-1]
         elif name == "top_quaternion":

@@ -129,6 +129,7 @@ MISTAKES = {
     ),
     "no floor": ('bond.pairs=[{effort="force", flow="velocity", floor=0}]', "bond.pairs[1].floor = 0: must be > 0"),
     "derivative": ('bond.impedance_derivative="force"', "bond.impedance_derivative = 'force': has 3 values, must have 6 x 6"),
+    "yielding": ('bond.yielding="impedance"', "bond.yielding = 'impedance': must have a met_flow in every pair"),
     "recorded": ('units.mass.outputs=["nowhere"]', "units.mass.outputs = 'nowhere': unit mass has no such output"),
     "parameter": ("units.mass.parameters={weight=1}", "units.mass.parameters.weight = 1: unknown parameter"),
     "input": ("units.mass.inputs={force=[1]}", "units.mass.inputs.force = [1]: must have 3 values"),

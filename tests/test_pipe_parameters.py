@@ -183,7 +183,7 @@ def test_every_port_has_a_value_of_its_size_that_is_finite():
     parameters = PipeParameters(nodes=10, seabed=Seabed(friction=0.3), added_mass=AddedMass(), environment=sea(800.0, 0.5), **damped)
     unit = PipeUnit(parameters)
     assert unit.initialize(0.0, {}) is None
-    assert unit.step(0.0, 0.1, {"velocity": np.array([0.1, 0.0, 0.0]), "angular_velocity": np.zeros(3)}) is None
+    assert unit.step(0.0, 0.1, {"velocity": np.array([0.1, 0.0, 0.0]), "angular_velocity": np.zeros(3), "mobility": np.zeros(36)}) is None
     for name, (size, _, _) in PipeUnit.outputs(parameters).items():
         value = unit.output(name)
         assert value.shape == (size,), name
@@ -198,7 +198,7 @@ def test_ports_report_works_and_forces_with_the_sign_of_the_pull_on_the_vessel()
     velocity = np.array([0.2, 0.1, -0.4])
     work = 0.0
     for k in range(5):
-        assert unit.step(0.1 * k, 0.1, {"velocity": velocity, "angular_velocity": np.zeros(3)}) is None
+        assert unit.step(0.1 * k, 0.1, {"velocity": velocity, "angular_velocity": np.zeros(3), "mobility": np.zeros(36)}) is None
         work -= 0.1 * unit.output("force") @ velocity
     assert unit.output("top_work")[0] == pytest.approx(work, rel=1e-12)
     energies = sum(unit.output(f"{kind}_energy")[0] for kind in ("kinetic", "elastic", "gravity"))
@@ -214,7 +214,7 @@ def test_state_is_a_value_to_set_and_pickle():
 
     unit = PipeUnit(PipeParameters(nodes=10))
     assert unit.initialize(0.0, {}) is None
-    inputs = {"velocity": np.array([0.2, 0.0, 0.1]), "angular_velocity": np.zeros(3)}
+    inputs = {"velocity": np.array([0.2, 0.0, 0.1]), "angular_velocity": np.zeros(3), "mobility": np.zeros(36)}
     unit.step(0.0, 0.1, inputs)
     saved = pickle.loads(pickle.dumps(unit.state))
     unit.step(0.1, 0.1, inputs)

@@ -213,6 +213,24 @@ def test_impedance_is_the_difference_of_top_forces_by_top_velocities(name):
     assert np.linalg.eigvalsh(impedance + impedance.T)[0] > -1e-6 * np.abs(impedance).max()  # it resists
 
 
+@pytest.mark.parametrize("name", ["current", "pinned-top", "added-mass"])
+@pytest.mark.parametrize("mass", [1e3, 1e7])
+def test_a_top_that_yields_meets_the_law_of_what_holds_it_and_feels_the_force_of_its_own_motion(name, mass):
+    pipe, _, start = started(scene(name))
+    state, h = march(pipe, start, sway, 0.1, 5)[0][-1], 0.2
+    a = np.random.default_rng(1).normal(size=(6, 6))
+    mobility = 0.5 * h / mass * (np.diag([1.0] * 3 + [0.1] * 3) + 0.01 * a @ a.T)  # of a body held off its centre
+    pull = pipe.step(state, np.zeros(3), np.zeros(3), h).top
+    free = np.array([0.2, 0.1, -0.3, 0.0, 0.01, 0.0]) + mobility @ pull
+    met = pipe.step(state, free[:3], free[3:], h, mobility)
+    assert met.converged
+    velocity = met.state.last[-1]
+    held = slice(0, 3) if name == "pinned-top" else slice(0, 6)
+    np.testing.assert_allclose(velocity[held], (free - mobility @ met.top)[held], rtol=0.0, atol=1e-9 * np.abs(free).max())
+    told = pipe.step(state, velocity[:3], velocity[3:], h)
+    np.testing.assert_allclose(met.top, told.top, rtol=0.0, atol=1e-9 * np.abs(told.top).max())
+
+
 @pytest.mark.parametrize("size", [1e-4, 0.05])
 @pytest.mark.parametrize("name", ["current", "everything"])
 def test_residual_is_the_same_with_and_without_its_tangent(name, size):
@@ -331,10 +349,10 @@ def test_states_are_values_that_no_step_changes():
 
 def test_unit_reports_a_failed_step_in_one_line_and_keeps_its_state():
     unit = PipeUnit(scene("current"))
-    still = {"velocity": np.zeros(3), "angular_velocity": np.zeros(3)}
+    still = {"velocity": np.zeros(3), "angular_velocity": np.zeros(3), "mobility": np.zeros(36)}
     assert unit.initialize(0.0, still) is None
     before = unit.state
-    message = unit.step(0.0, 1.0, {"velocity": np.array([4000.0, 0.0, 0.0]), "angular_velocity": np.array([0.0, 300.0, 0.0])})
+    message = unit.step(0.0, 1.0, still | {"velocity": np.array([4000.0, 0.0, 0.0]), "angular_velocity": np.array([0.0, 300.0, 0.0])})
     assert message is not None
     assert "\n" not in message
     assert "no convergence" in message

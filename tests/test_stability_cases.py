@@ -35,10 +35,11 @@ def test_the_lim_oscillator_keeps_its_energy(cache):
     assert np.abs(run.positions - exact).max() < 0.2 * np.abs(serial.positions - exact).max()
 
 
-def test_the_quarter_car_is_closer_than_serial_exchange_and_its_ledger_closes(cache):
-    (result,) = published.quarter_car(cache, [1e-2])
-    assert result.error < 0.2 * result.best
-    assert result.closure <= 1e-12
+def test_the_quarter_car_is_below_the_published_cut_of_the_parallel_exchanges_error_and_its_ledger_closes(cache):
+    results = published.quarter_car(cache)
+    assert all(result.holds for result in results)
+    assert all(result.closure <= 1e-12 for result in results)
+    assert 1.9 < math.log10(results[1].error / results[0].error) < 2.1
 
 
 def test_the_manipulator_reference_is_the_published_one_to_its_own_error():
@@ -111,7 +112,7 @@ def test_the_pipe_against_a_body_of_any_mass(rest, mass, state):
     assert found.finished
     assert found.residual <= 1e-6
     assert max(found.gap_m, found.gap_rad) <= 1e-9
-    assert found.solves <= 5.0
+    assert found.solves == 2.0
 
 
 def test_serial_exchange_loses_a_light_body(rest):
@@ -120,11 +121,13 @@ def test_serial_exchange_loses_a_light_body(rest):
     assert found.end_s < 10.0
 
 
-def test_the_states_are_what_they_are_called(rest):
-    pull = {state.name: bodies.run(bodies.Case("energy-consistent", 1e4, 0.2, state, duration=24.0), rest) for state in bodies.STATES}
+@pytest.mark.parametrize("mass", [1e2, 1e4, 1e6, 1e8])
+def test_the_states_are_what_they_are_called(rest, mass):
+    pull = {state.name: bodies.run(bodies.Case("energy-consistent", mass, 0.2, state, duration=24.0), rest) for state in bodies.STATES}
     still = float(np.linalg.norm(rest.pull[:3])) / 1e3
     assert pull["taut"].least_pull > 0.7 * still
     assert pull["slack"].least_pull < 0.15 * still
+    assert pull["snapping"].least_pull < 0.15 * still
     assert pull["snapping"].largest_pull > 2.0 * still
 
 

@@ -3,6 +3,7 @@
 The body takes the vessel's place at the clamped top of a 1200 m pipe. A constant force and moment hold the static pull; a force along
 the pull and a moment shake it. Both have a part in proportion to the pull, which moves a light body against the pipe, and one
 in proportion to the body's mass, which gives a heavy body a motion of some metres and a tenth of a radian at the period of the sea.
+Taut: the pull stays above 0.7 of that at rest; slack: it falls below 0.15 of it; snapping: it rises above twice that as well.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class State:
 
 STATES = (
     State("taut", 0.2, 1.0, 0.05, 12.0),
-    State("slack", 0.9, 4.0, 0.1, 12.0),
+    State("slack", 0.9, 10.0, 0.1, 12.0),
     State("snapping", 1.5, 6.0, 0.1, 8.0),
 )
 

@@ -3,8 +3,9 @@
 - oscillator: B. Rodriguez et al., Multibody Syst. Dyn. 55 (2022), and the linear oscillator of the Laboratorio de Ingenieria Mecanica;
 - manipulator: the same authors' hydraulic manipulator, manoeuvre M1 (units/manipulator_fmu);
 - schueller: V. Schueller's two-mass oscillator; the published implicit figures are those of the midpoint rule;
-- quarter-car: S. Sadjina et al., ECCO. No figure is published with it that another step could be held against; the explicit
-  schemes, run here at the same step, stand in its place.
+- quarter-car: S. Sadjina et al., "Energy conservation and power bonds in co-simulations" (ECCO; arXiv 1602.06434). Its abstract states
+  a relative figure only: errors up to 93 % smaller than those of as many constant steps of parallel exchange. The error of that
+  exchange, run here at the same step, less 93 %, is the figure to be below; no absolute error was to be had.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from master.stability.limits import COLUMNS
 from master.stability.units.manipulator_fmu import model
 
 DRIFT = 1e-9
+ECCO_CUT = 0.93  # of the error of parallel exchange, published
 
 
 @dataclass(frozen=True)
@@ -143,9 +145,10 @@ def quarter_car(folder: Path, steps: Sequence[float] = (1e-3, 1e-2)) -> list[Res
     """The quarter car over a step of the road, with macro steps of `steps` [s]."""
     found = []
     for step in steps:
-        serial = oscillate(QUARTER_CAR, step, folder, "serial")
-        best = float(np.abs(serial.positions - QUARTER_CAR.exact(np.linspace(0.0, QUARTER_CAR.end, len(serial.positions)))).max())
-        found.append(_oscillator("quarter-car", QUARTER_CAR, step, best, "serial exchange, run here", folder, False))
+        parallel = oscillate(QUARTER_CAR, step, folder, "parallel")
+        error = float(np.abs(parallel.positions - QUARTER_CAR.exact(np.linspace(0.0, QUARTER_CAR.end, len(parallel.positions)))).max())
+        best = (1.0 - ECCO_CUT) * error
+        found.append(_oscillator("quarter-car", QUARTER_CAR, step, best, "93 % below parallel, published (ECCO)", folder, False))
     return found
 
 
