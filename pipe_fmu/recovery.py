@@ -59,6 +59,7 @@ def nodal_wrenches(line, water, position, quaternion, velocity, strain):
     unused = np.empty((12, 12))
     ends = np.zeros((2, 6))
     depths = np.empty(2)
+    scratch = np.empty((2, 3, 12))
     for e in range(n - 1):
         h = line.length[e]
         rm, u, psi = frame(spin(quaternion, e), spin(quaternion, e + 1), chord(position, e))
@@ -76,9 +77,10 @@ def nodal_wrenches(line, water, position, quaternion, velocity, strain):
         if water.drag:
             for i in range(3):
                 ends[0, i], ends[1, i] = velocity[e, i], velocity[e + 1, i]
-            add_drag(rm, u, psi, h, line.drag[e], ends, depths, water.levels, water.velocities, 0.0, False, vector, unused)
+            add_drag(rm, u, psi, h, line.drag[e], ends, depths, water.levels, water.velocities, 0.0, False, vector, unused, scratch)
         if line.bed.shape[0] > 0:
-            add_contact(h, line.diameter[e], line.weight[e], depths[0], depths[1], strain[e, STRAINS], rows[STRAINS], vector, unused)
+            sag = strain[e, STRAINS]
+            add_contact(h, line.diameter[e], line.weight[e], depths[0], depths[1], sag, rows[STRAINS], vector, unused, scratch)
         for i in range(6):
             out[e, i] -= vector[i] * (1.0 if e == 0 else 0.5)
             out[e + 1, i] += vector[6 + i] * (1.0 if e == n - 2 else 0.5)
