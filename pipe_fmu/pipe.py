@@ -57,11 +57,11 @@ class Pipe:
 
     def von_mises(self, state: PipeState, forces: SectionForces) -> Array:
         """Largest von Mises stress (n,) [Pa] over the wall at every node."""
-        return recovery.von_mises(self.parameters, self.wall, state.position, forces)
+        return recovery.von_mises(self.wall, state.position, forces)
 
     def wall_tension(self, state: PipeState, forces: SectionForces) -> Array:
         """Force (n,) [N] in the wall at every node."""
-        return recovery.wall_tension(self.parameters, self.wall, state.position, forces)
+        return recovery.wall_tension(self.wall, state.position, forces)
 
     def largest_bending_moment(self, forces: SectionForces) -> float:
         """Largest bending moment [N m] along the line, between the nodes too."""
