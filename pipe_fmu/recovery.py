@@ -137,7 +137,7 @@ def wall(parameters: PipeParameters, s: Array) -> Wall:
         )
         for one in at
     ]
-    return Wall(*np.array(columns).T.copy(), water=environment.water_density * environment.gravity, depth=environment.depth)
+    return Wall._make([*np.array(columns).T.copy(), environment.water_density * environment.gravity, environment.depth])
 
 
 def wall_tension(wall: Wall, position: Array, forces: SectionForces) -> Array:
