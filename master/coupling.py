@@ -61,6 +61,7 @@ class EnergyConsistent:
         self.wanted = macro_step
         self.counters = Counters()
         self._guess = Extrapolation(mobility.result(), impedance.result(), bond.idle_power)
+        self._one = np.eye(bond.size)
         self._Z = self._Y = self._inertia = np.empty((0, 0))  # the last is Y^-1
         self._length = 0.0  # the step they belong to; 0: none
         self._converged = False
@@ -125,7 +126,7 @@ class EnergyConsistent:
         self._converged, believed, before = False, True, np.inf
         for rounds in range(1, LAST_ROUND + 1):
             Z, Y = self._Z, self._Y
-            held = np.linalg.solve(np.eye(self.bond.size) + Z @ Y, effort + Z @ (flow - free))
+            held = np.linalg.solve(self._one + Z @ Y, effort + Z @ (flow - free))
             new_flow = self.mobility.solve(time, step, held)
             new_effort = self.impedance.solve(time, step, new_flow)
             gap = held - new_effort

@@ -231,11 +231,15 @@ def top_tension(pipe: Source) -> Row:
 
 def pose_gap(pipe: Source, vessel: Source, clamped: bool = True) -> Row:
     """Distance [m] and, if `clamped`, angle [rad] between the two units' idea of the hang-off point's pose."""
-    held = pipe.get(("top_position", "top_quaternion"))
-    holding = vessel.get(("hang_off_position", "hang_off_quaternion"))
-    p, q = held[3:], holding[3:]
-    vector = p[0] * q[1:] - q[0] * p[1:] - np.cross(p[1:], q[1:])  # of conj(p) q: the sine of half the angle
-    angle = 2.0 * math.asin(min(1.0, float(np.linalg.norm(vector))))
+    held = pipe.get(("top_position", "top_quaternion")).tolist()
+    holding = vessel.get(("hang_off_position", "hang_off_quaternion")).tolist()
+    (p0, p1, p2, p3), (q0, q1, q2, q3) = held[3:], holding[3:]
+    vector = (  # of conj(p) q: the sine of half the angle
+        p0 * q1 - q0 * p1 - p2 * q3 + p3 * q2,
+        p0 * q2 - q0 * p2 - p3 * q1 + p1 * q3,
+        p0 * q3 - q0 * p3 - p1 * q2 + p2 * q1,
+    )
+    angle = 2.0 * math.asin(min(1.0, math.hypot(*vector)))
     return {("pose_gap", "m"): math.dist(held[:3], holding[:3])} | ({("pose_gap_angle", "rad"): angle} if clamped else {})
 
 

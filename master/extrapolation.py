@@ -19,32 +19,33 @@ class Extrapolation:
     def __init__(self, flow: Vector, effort: Vector, norm: Callable[[Vector], float]) -> None:
         self._start = np.concatenate([flow, effort])
         self._n, self._norm = flow.size, norm
-        self._points: deque[tuple[float, Vector]] = deque(maxlen=HIGHEST_ORDER + 1)
+        self._nodes: deque[float] = deque(maxlen=HIGHEST_ORDER + 1)  # the latest first
+        self._points: deque[Vector] = deque(maxlen=HIGHEST_ORDER + 1)
         self._errors = [0.0] * (HIGHEST_ORDER + 1)
 
     def at(self, time: float) -> tuple[Vector, Vector]:
         """Flow and effort expected as the mean over a step with this middle."""
-        orders = range(len(self._points))
-        best = min(orders, key=self._errors.__getitem__, default=0)
-        value = self._value(time, best)
+        if not self._nodes:
+            return self._start[: self._n], self._start[self._n :]
+        best = min(range(len(self._nodes)), key=self._errors.__getitem__)
+        value = np.array(self._weights(time, best)) @ np.array(self._points)
         return value[: self._n], value[self._n :]
 
     def add(self, time: float, flow: Vector, effort: Vector) -> None:
         """Take in an accepted step and judge the orders by it."""
-        for order in range(len(self._points)):
-            error = self._norm(effort - self._value(time, order)[self._n :])
-            self._errors[order] = max(error, MEMORY * self._errors[order])
-        self._points.appendleft((time, np.concatenate([flow, effort])))
+        if self._nodes:
+            weights = [self._weights(time, order) for order in range(len(self._nodes))]
+            for order, value in enumerate(np.array(weights) @ np.array(self._points)):
+                self._errors[order] = max(self._norm(effort - value[self._n :]), MEMORY * self._errors[order])
+        self._nodes.appendleft(time)
+        self._points.appendleft(np.concatenate([flow, effort]))
 
-    def _value(self, time: float, order: int) -> Vector:
-        if not self._points:
-            return self._start
-        nodes = [node for node, _ in list(self._points)[: order + 1]]
-        total = np.zeros_like(self._start)
-        for i, (node, (_, value)) in enumerate(zip(nodes, self._points, strict=False)):
-            weight = 1.0
-            for j, other in enumerate(nodes):
+    def _weights(self, time: float, order: int) -> list[float]:
+        """Lagrange's weights of the points, zero for those that the order does not use."""
+        nodes, weights = self._nodes, [0.0] * len(self._nodes)
+        for i in range(order + 1):
+            weights[i] = 1.0
+            for j in range(order + 1):
                 if j != i:
-                    weight *= (time - other) / (node - other)
-            total += weight * value
-        return total
+                    weights[i] *= (time - nodes[j]) / (nodes[i] - nodes[j])
+        return weights

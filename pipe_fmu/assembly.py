@@ -4,12 +4,10 @@ An element's rows of nine (chord, mean spin, spin difference) reach its nodes th
 theta_2 - theta_1. A node's six unknowns are (displacement, spin), all in e.
 """
 
-import numpy as np
-
-from .compiled import kernel
+from .compiled import inner
 
 
-@kernel
+@inner
 def expand(row, out):
     """Row of nine to the twelve nodal unknowns (phi_1, theta_1, phi_2, theta_2)."""
     for i in range(3):
@@ -19,7 +17,7 @@ def expand(row, out):
         out[9 + i] = 0.5 * row[3 + i] + row[6 + i]
 
 
-@kernel
+@inner
 def add_vector(residual, e, vector):
     """Add an element's twelve to `residual` (n, 6)."""
     for i in range(6):
@@ -27,7 +25,7 @@ def add_vector(residual, e, vector):
         residual[e + 1, i] += vector[6 + i]
 
 
-@kernel
+@inner
 def add_matrix(diagonal, lower, upper, e, matrix):
     """Add an element's 12 x 12 to the block tridiagonal matrix."""
     for i in range(6):
@@ -38,7 +36,7 @@ def add_matrix(diagonal, lower, upper, e, matrix):
             diagonal[e + 1, i, j] += matrix[6 + i, 6 + j]
 
 
-@kernel
+@inner
 def add_outer(matrix, factor, left, right):
     """matrix += factor left right^T."""
     for i in range(left.shape[0]):
@@ -48,23 +46,30 @@ def add_outer(matrix, factor, left, right):
                 matrix[i, j] += f * right[j]
 
 
-@kernel
+@inner
 def expand_matrix(nine, out):
     """9 x 9 in (chord, mean spin, spin difference) to 12 x 12 in the nodal unknowns."""
-    wide = np.empty((9, 12))
-    for i in range(9):
-        expand(nine[i], wide[i])
-    column = np.empty(9)
-    tall = np.empty(12)
-    for j in range(12):
-        for i in range(9):
-            column[i] = wide[i, j]
-        expand(column, tall)
-        for i in range(12):
-            out[i, j] = tall[i]
+    for i in range(3):  # rows first, in the places of phi_1, theta_1 and theta_2
+        for j in range(9):
+            mean, half = 0.5 * nine[3 + i, j], nine[6 + i, j]
+            out[i, j] = -nine[i, j]
+            out[3 + i, j] = mean - half
+            out[9 + i, j] = mean + half
+    for i in range(12):
+        if 6 <= i < 9:
+            continue
+        for j in range(3):
+            chord, mean, half = out[i, j], 0.5 * out[i, 3 + j], out[i, 6 + j]
+            out[i, j] = -chord
+            out[i, 3 + j] = mean - half
+            out[i, 6 + j] = chord
+            out[i, 9 + j] = mean + half
+    for i in range(3):
+        for j in range(12):
+            out[6 + i, j] = -out[i, j]
 
 
-@kernel
+@inner
 def clear(diagonal, lower, upper):
     """Zero the tangent."""
     diagonal[:] = 0.0

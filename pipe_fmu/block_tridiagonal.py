@@ -7,12 +7,12 @@ a right-hand side, as often as there are any, and `substitute` finds x from that
 
 import math
 
-from .compiled import kernel
+from .compiled import inner
 
 SIZE = 6
 
 
-@kernel
+@inner
 def lu(a, pivots):
     """Factors of a dense block (m, m) in place, rows exchanged as `pivots` (m,) says. False if singular."""
     m = a.shape[0]
@@ -37,7 +37,7 @@ def lu(a, pivots):
     return True
 
 
-@kernel
+@inner
 def lu_solve_vector(a, pivots, b):
     """Solve with the factors of `lu` for one right-hand side `b` (m,), in place."""
     m = a.shape[0]
@@ -55,7 +55,7 @@ def lu_solve_vector(a, pivots, b):
         b[k] = value / a[k, k]
 
 
-@kernel
+@inner
 def lu_solve(a, pivots, b):
     """Solve with the factors of `lu` for the columns of `b` (m, c), in place."""
     m, c = b.shape
@@ -81,7 +81,7 @@ def lu_solve(a, pivots, b):
             b[k, j] *= inverse
 
 
-@kernel
+@inner
 def factorize(diagonal, lower, upper, pivots):
     """Condense nodes 0..n-2 onto node n-1, in place: diagonal[i] becomes its factors, upper[i] D^-1 U. False if singular.
 
@@ -100,7 +100,7 @@ def factorize(diagonal, lower, upper, pivots):
     return True
 
 
-@kernel
+@inner
 def condense(diagonal, lower, pivots, right):
     """Condense a right-hand side (n, 6) with the factors, in place."""
     for k in range(right.shape[0] - 1):
@@ -112,7 +112,7 @@ def condense(diagonal, lower, pivots, right):
             right[k + 1, i] -= value
 
 
-@kernel
+@inner
 def substitute(upper, right, top, x):
     """Solution for the right-hand side -`right`, condensed, whose last unknown is `top` (6,), into `x` (n, 6)."""
     n = right.shape[0]

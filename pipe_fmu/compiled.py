@@ -3,10 +3,14 @@
 numba looks at a kernel's own file to see whether its cached code is still good, but not at the files of the kernels it
 calls. So when any source of the package is newer than a cache index, all indices of the package are dropped and
 everything is compiled afresh.
+
+An `inner` kernel allocates no array, so those it is given need no counting of references, which would cost more than its arithmetic; sums
+may be rearranged in it (fused multiply-add), while NaN and infinity keep their meaning.
 """
 
 import os
 from pathlib import Path
+from typing import Any
 
 from numba import njit
 
@@ -27,3 +31,5 @@ def drop_stale_cache(package: Path) -> int:
 drop_stale_cache(Path(__file__).parent)
 
 kernel = njit(cache=True, error_model="numpy")
+_BARE: dict[str, Any] = {"_nrt": False, "fastmath": {"contract", "arcp", "nsz", "reassoc"}}
+inner = njit(cache=True, error_model="numpy", **_BARE)

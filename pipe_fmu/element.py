@@ -31,16 +31,14 @@ conjugate vectors N, c = N x u, M = A^-1 Q + b psi x c of (nu, beta, mu): its ro
 
 import math
 
-import numpy as np
-
-from .compiled import kernel
+from .compiled import inner
 from .so3 import add, apply, apply_transposed, conjugate, cross, dot, log, matrix, multiply, root, scale
 
 STRAINS = 6
 ROWS = 7
 
 
-@kernel
+@inner
 def _chi(z):
     """chi = (rho - 1) / z and its first two derivatives, rho = a / sin a, z = |psi|^2 = 4 a^2."""
     if z < 0.36:
@@ -61,7 +59,7 @@ def _chi(z):
     return chi, d1, d2
 
 
-@kernel
+@inner
 def _half_spin(z):
     """b = tan(a / 2) / (4 a) and its derivative with respect to z = 4 a^2."""
     if z < 0.04:
@@ -72,7 +70,7 @@ def _half_spin(z):
     return t / (4.0 * a), (0.5 * (1.0 + t * t) / (4.0 * a) - t / (4.0 * a * a)) / (8.0 * a)
 
 
-@kernel
+@inner
 def frame(q1, q2, d):
     """Mid frame (rows of R_m), chord in it and relative rotation vector: (rm, u, psi)."""
     relative = multiply(conjugate(q1), q2)
@@ -80,7 +78,7 @@ def frame(q1, q2, d):
     return rm, apply_transposed(rm, d), log(relative)
 
 
-@kernel
+@inner
 def strains(rm, u, psi, h, share, out):
     """Strains 0-5 and the sag 6 of one element into `out` (7,); `share` (2,) holds p_2, p_3."""
     z = dot(psi, psi)
@@ -99,7 +97,7 @@ def strains(rm, u, psi, h, share, out):
     out[6] = 0.5 * dot(rm[2], cross(u, psi))
 
 
-@kernel
+@inner
 def _put(row, rm, n, q, c, psi, rho, chi, b):
     """Row of nine (e components) of a function with gradients n, q and frame moment c."""
     m = add(add(scale(rho, q), scale(-chi * dot(psi, q), psi)), scale(b, cross(psi, c)))
@@ -109,7 +107,7 @@ def _put(row, rm, n, q, c, psi, rho, chi, b):
     row[6], row[7], row[8] = m_e
 
 
-@kernel
+@inner
 def gradients(rm, u, psi, h, share, out):
     """Rows of nine of the strains and the sag with respect to (d, mean spin, spin difference) into `out` (7, 9), e components."""
     z = dot(psi, psi)
@@ -145,7 +143,7 @@ def gradients(rm, u, psi, h, share, out):
     _put(out[6], rm, n, scale(0.5, cross(down, u)), c, psi, rho, chi, b)
 
 
-@kernel
+@inner
 def resultant(rm, u, psi, h, share, stress, out):
     """`stress` (7,) . gradients into `out` (9,), e components: force on the chord, moments on the mean spin and the spin difference."""
     z = dot(psi, psi)
@@ -173,7 +171,7 @@ def resultant(rm, u, psi, h, share, stress, out):
     _put(out, rm, n, q, c, psi, rho, chi, _half_spin(z)[0])
 
 
-@kernel
+@inner
 def geometric_stiffness(rm, u, psi, h, share, stress, out):
     """Derivative of `stress` (7,) . gradients at fixed stress into `out` (9, 9), e components; exact, unsymmetric off equilibrium."""
     z = dot(psi, psi)
@@ -207,7 +205,6 @@ def geometric_stiffness(rm, u, psi, h, share, stress, out):
     psi_q = dot(psi, q)
     m = add(add(scale(rho, q), scale(-chi * psi_q, psi)), scale(b, cross(psi, c)))
 
-    local = np.empty((9, 9))
     for j in range(9):
         unit = (1.0 if j % 3 == 0 else 0.0, 1.0 if j % 3 == 1 else 0.0, 1.0 if j % 3 == 2 else 0.0)
         zero = (0.0, 0.0, 0.0)
@@ -251,13 +248,13 @@ def geometric_stiffness(rm, u, psi, h, share, stress, out):
         rows = (add(d_n, cross(spin, n)), add(d_c, cross(spin, c)), add(d_m, cross(spin, m)))
         for i in range(3):
             turned = apply(rm, rows[i])
-            local[3 * i, j] = turned[0]
-            local[3 * i + 1, j] = turned[1]
-            local[3 * i + 2, j] = turned[2]
+            out[3 * i, j] = turned[0]
+            out[3 * i + 1, j] = turned[1]
+            out[3 * i + 2, j] = turned[2]
     for i in range(9):
         for j in range(3):
             k = 3 * j
-            turned = apply(rm, (local[i, k], local[i, k + 1], local[i, k + 2]))
+            turned = apply(rm, (out[i, k], out[i, k + 1], out[i, k + 2]))
             out[i, k] = turned[0]
             out[i, k + 1] = turned[1]
             out[i, k + 2] = turned[2]

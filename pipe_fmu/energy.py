@@ -1,12 +1,12 @@
 """Energies of the pipe, eqs. (71)-(73) with gravity's sign mended."""
 
-from .compiled import kernel
+from .compiled import inner
 from .element import ROWS, STRAINS
 from .loads import BED_POINTS, BED_WEIGHTS
 from .seabed import contact
 
 
-@kernel
+@inner
 def energies(line, position, quaternion, velocity, rate, flow, strain):
     """(kinetic, elastic, gravity, contact) [J] of a state; arrays as in step_kernel.step_system."""
     kinetic, elastic, gravity, pressed = 0.0, 0.0, 0.0, 0.0
@@ -27,7 +27,7 @@ def energies(line, position, quaternion, velocity, rate, flow, strain):
     return kinetic, elastic, gravity, pressed
 
 
-@kernel
+@inner
 def contact_potential(h, diameter, weight, z1, z2, sag):
     """Potential [J] of one element on the bed, at the same points as loads.add_contact."""
     total = 0.0

@@ -2,11 +2,11 @@
 
 import math
 
-from .compiled import kernel
+from .compiled import inner
 from .so3 import add, dot, scale
 
 
-@kernel
+@inner
 def drag(v_r, tangent, tangential, normal):
     """Drag force per length on the water [N/m] for relative velocity `v_r` and unit tangent t1, all in e.
 
@@ -21,7 +21,7 @@ def drag(v_r, tangent, tangential, normal):
     return force, a, 2.0 * tangential * math.fabs(v_t) - a, (normal / speed if speed > 0.0 else 0.0), v_n
 
 
-@kernel
+@inner
 def current_at(z, levels, velocities):
     """Current (3,) at depth coordinate z: linear between `levels` (n,), ascending, constant beyond; `velocities` (n, 3) [m/s]."""
     n = levels.shape[0]

@@ -8,10 +8,8 @@ the power at the points, exactly.
 
 import math
 
-import numpy as np
-
 from .assembly import add_outer, expand
-from .compiled import kernel
+from .compiled import inner
 from .hydrodynamics import current_at, drag
 from .seabed import contact, mean_contact
 from .so3 import add, apply, cross, dot, scale
@@ -21,7 +19,7 @@ BED_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.93
 BED_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
 
 
-@kernel
+@inner
 def _sag_rate(d, bow, v1, v2, w1, w2):
     """Rate of c = d x psi / 2; `bow` is psi in e."""
     mean = scale(0.5, add(w1, w2))
@@ -29,7 +27,7 @@ def _sag_rate(d, bow, v1, v2, w1, w2):
     return scale(0.5, add(cross(add(v2, scale(-1.0, v1)), bow), cross(d, turned)))
 
 
-@kernel
+@inner
 def _linked_motion(x, d, bow, moves):
     """Matrix (3, 12) from the nodes' (v_1, w_1, v_2, w_2) to the velocity of the point at x."""
     half = 0.5 * x * (1.0 - x)
@@ -45,7 +43,7 @@ def _linked_motion(x, d, bow, moves):
             moves[i, 9 + j] = half * (0.5 * rolled[i] + bent[i])
 
 
-@kernel
+@inner
 def _add_linked(x, d, bow, force, vector):
     """Add the nodes' share of a force at x, the transpose of `_linked_motion` times the force, to `vector` (12,)."""
     half = 0.5 * x * (1.0 - x)
@@ -59,12 +57,12 @@ def _add_linked(x, d, bow, force, vector):
         vector[9 + i] += rolled[i] + half * lever[i]
 
 
-@kernel
-def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate, fresh, vector, matrix):
+@inner
+def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate, fresh, vector, matrix, scratch):
     """Drag on one element into `vector` (12,) (minus the force on the pipe) and, if `fresh`, its tangent into `matrix` (12, 12).
 
     rm, u, psi: frame, chord in it and relative rotation; `ends` (2, 6) velocities (v, w) of the nodes; `depths` (2,) their z;
-    `rate` = d velocity / d unknown [1/s], 0 in statics; the rotation of t1 is weighted 1 in statics, 1/2 in a step.
+    `rate` = d velocity / d unknown [1/s], 0 in statics; the rotation of t1 is weighted 1 in statics, 1/2 in a step. `scratch` (2, 3, 12).
     Returns (power dissipated >= 0, power supplied by the current) [W].
     """
     d = apply(rm, u)
@@ -75,9 +73,7 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
     sag = 0.5 * (d[0] * bow[1] - d[1] * bow[0])
     dissipated, supplied = 0.0, 0.0
     turn = 0.5 if rate > 0.0 else 1.0
-    moves = np.empty((3, 12))
-    slopes = np.empty((3, 12))
-    change_t = np.empty((3, 3))
+    moves, slopes = scratch[0], scratch[1]
     for x in _DRAG_POINTS:
         y = 1.0 - x
         linked = x * y
@@ -98,6 +94,13 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
         if not fresh:
             continue
         _linked_motion(x, d, bow, moves)
+        for i in range(3):
+            for j in range(12):
+                value = 0.0
+                for k in range(3):
+                    slope = b * tangent[i] * tangent[k] + c * v_n[i] * v_n[k] + (a if i == k else 0.0)
+                    value += slope * moves[k, j]
+                slopes[i, j] = 0.5 * h * rate * value
         v_t = dot(v_r, tangent)
         for j in range(3):  # derivative with respect to the spin of t1
             unit = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
@@ -108,28 +111,19 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
             k = 2.0 * coefficients[0] * math.fabs(v_t) * s_t
             change = add(change, add(scale(k, tangent), scale(coefficients[0] * math.fabs(v_t) * v_t, d_t)))
             for i in range(3):
-                change_t[i, j] = 0.25 * h * turn * change[i]
-        for i in range(3):
-            for j in range(12):
-                value = 0.0
-                for k in range(3):
-                    slope = b * tangent[i] * tangent[k] + c * v_n[i] * v_n[k] + (a if i == k else 0.0)
-                    value += slope * moves[k, j]
-                slopes[i, j] = 0.5 * h * rate * value
-            for j in range(3):
-                slopes[i, 3 + j] += change_t[i, j]
-                slopes[i, 9 + j] += change_t[i, j]
+                slopes[i, 3 + j] += 0.25 * h * turn * change[i]
+                slopes[i, 9 + j] += 0.25 * h * turn * change[i]
         for i in range(12):
             for j in range(12):
                 matrix[i, j] += moves[0, i] * slopes[0, j] + moves[1, i] * slopes[1, j] + moves[2, i] * slopes[2, j]
     return dissipated, supplied
 
 
-@kernel
-def add_contact(h, diameter, weight, z1, z2, sag, sag_row, vector, matrix):
-    """Static reaction of the bed on one element; `sag_row` (9,) gradient of the sag. Returns its potential [J]."""
+@inner
+def add_contact(h, diameter, weight, z1, z2, sag, sag_row, vector, matrix, scratch):
+    """Static reaction of the bed on one element; `sag_row` (9,) gradient of the sag; `scratch` (2, 3, 12). Returns its potential [J]."""
     potential = 0.0
-    row = np.empty(12)
+    row = scratch[0, 0]
     for k in range(4):
         x = BED_POINTS[k]
         y = 1.0 - x
@@ -149,19 +143,18 @@ def add_contact(h, diameter, weight, z1, z2, sag, sag_row, vector, matrix):
     return potential
 
 
-@kernel
-def add_mean_contact(h, dt, diameter, weight, bed, old, new, ends, mean_row, new_row, fresh, sharp, vector, matrix):
+@inner
+def add_mean_contact(h, dt, diameter, weight, bed, old, new, ends, mean_row, new_row, fresh, sharp, vector, matrix, scratch):
     """Reaction of the bed over a step: discrete gradient of the potential, damping and friction.
 
     `old`, `new` (3,): z of the two nodes and sag before and after; `ends` (2, 6) mean velocities; `mean_row`, `new_row` (9,) gradients
     of the sag, averaged over the step and at its end; `bed` = (damping [s/m], friction, friction speed [m/s]). The dashpot's force is
     damping * z' times the elastic force: it acts in contact only, and at most takes that force away. Friction is Coulomb's, regularised.
     Tangent if `fresh`; that of friction is Newton's if `sharp`, else one that never underrates it, with which no correction overshoots.
-    Returns the work dissipated [J].
+    `scratch` (2, 3, 12). Returns the work dissipated [J].
     """
     dissipated = 0.0
-    row = np.empty(12)
-    row_new = np.empty(12)
+    row, row_new = scratch[0, 0], scratch[0, 1]
     for k in range(4):
         x = BED_POINTS[k]
         y = 1.0 - x

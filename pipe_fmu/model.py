@@ -149,15 +149,25 @@ def _line(parameters: PipeParameters, s: Array) -> Line:
 
 def water(parameters: PipeParameters, time: float) -> Water:
     """The water at `time` [s]."""
+    return waters(parameters)(time)
+
+
+def waters(parameters: PipeParameters) -> Callable[[float], Water]:
+    """The water as a function of time [s]."""
     environment = parameters.environment
     sticks = any(section.drag_normal > 0.0 or section.drag_tangential > 0.0 for section in parameters.all_sections)
-    current = environment.current
-    factor = current.time_factor(time) if current is not None else 0.0
-    if current is None or factor == 0.0:
-        return Water(np.zeros(0), np.zeros((0, 3)), sticks)
+    current, still = environment.current, Water(np.zeros(0), np.zeros((0, 3)), sticks)
+    if current is None:
+        return lambda time: still
     depths, factors = current.shape(environment.depth)
     levels = np.array(depths) - environment.depth  # from the surface down, so ascending in z
-    return Water(levels, factor * np.outer(factors, current.velocity), sticks)
+    flow = np.outer(factors, current.velocity)
+
+    def at(time: float) -> Water:
+        factor = current.time_factor(time)
+        return Water(levels, factor * flow, sticks) if factor != 0.0 else still
+
+    return at
 
 
 def estimate_tension(parameters: PipeParameters) -> tuple[float, float]:

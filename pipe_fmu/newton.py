@@ -15,7 +15,7 @@ NEAR = 1e-5  # residual from which on a tangent is kept
 SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
 SHARP = 1e-3  # residual below which a careful search takes Newton's tangent of friction
 LEAST_SHARE = 0.02  # of a correction: a careful search halves no further
-LOST = 1e12  # residual from which there is no way back
+LOST = 1e12  # residual, and element force over the axial stiffness, from which there is no way back
 
 
 @kernel
@@ -201,7 +201,8 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
                 gap = max(gap, math.fabs(wanted[i]))
         hold_foot_residual(line, quaternion, (x[0, 3], x[0, 4], x[0, 5]), residual)
         size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
-        done = gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous and share == 1.0))
+        lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
+        done = not lost and gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous and share == 1.0))
         if done and iteration > 0:
             return True, x, new_strain, force, tangent, works, iteration, size
         if careful and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
@@ -209,7 +210,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             _move(x, -share, correction)
             continue
         share, lowest = 1.0, size * force_scale
-        if not size < LOST or iteration == limit:
+        if lost or iteration == limit:
             break
         if fresh:
             hold_foot(line, quaternion, diagonal, upper)

@@ -1,20 +1,18 @@
 """What a step does at the nodes: inertia of lumped mass and section, rotational damping, added mass; and the state after it."""
 
-import numpy as np
-
-from .compiled import kernel
+from .compiled import inner
 from .so3 import add, apply, apply_transposed, cross, dot, exp, left_jacobian_transposed, matrix, multiply, normalize, scale
 from .static_kernel import spin
 
 DRAG, CURRENT, SPIN, INTERNAL, CONTACT, NUMERICAL = range(6)  # works over the step, in this order
 
 
-@kernel
+@inner
 def vector_of(x, i, j):
     return (x[i, j], x[i, j + 1], x[i, j + 2])
 
 
-@kernel
+@inner
 def turn_columns(theta, block):
     """block[:, 3:] <- block[:, 3:] J_l(theta): from spins at the end of the step to the rotation vector."""
     for i in range(6):
@@ -22,7 +20,7 @@ def turn_columns(theta, block):
         block[i, 3], block[i, 4], block[i, 5] = turned
 
 
-@kernel
+@inner
 def _mass_motion(offset, theta, r_old, dphi):
     """Arm of the node's mass averaged over the step, and the displacement of its centre (new arm - old arm = theta x mean, exactly)."""
     old = (offset * r_old[0][0], offset * r_old[1][0], offset * r_old[2][0])
@@ -30,7 +28,7 @@ def _mass_motion(offset, theta, r_old, dphi):
     return mean, add(dphi, cross(theta, mean))
 
 
-@kernel
+@inner
 def _add_lever(arm, arm_new, tensor, gain, fresh, block, residual):
     """Add the inertial force `gain` (3,) at the end of the node's arm, and its tangent: `tensor` (3, 3) = d gain / d displacement."""
     moment = cross(arm, gain)
@@ -53,9 +51,9 @@ def _add_lever(arm, arm_new, tensor, gain, fresh, block, residual):
             block[3 + b, 3 + a] += twist[b]
 
 
-@kernel
-def add_node(line, i, h, quaternion, velocity, rate, flow, x, fresh, block, residual, works):
-    """Inertia, rotational damping (material frame) and added mass of one node."""
+@inner
+def add_node(line, i, h, quaternion, velocity, rate, flow, x, fresh, block, residual, works, tensor):
+    """Inertia, rotational damping (material frame) and added mass of one node; `tensor` (3, 3) is scratch."""
     q = spin(quaternion, i)
     theta = vector_of(x, i, 3)
     r_old = matrix(q)
@@ -64,8 +62,10 @@ def add_node(line, i, h, quaternion, velocity, rate, flow, x, fresh, block, resi
     turn = apply_transposed(r_old, theta)
     arm, move = _mass_motion(line.offset[i], theta, r_old, vector_of(x, i, 0))
     arm_new = scale(line.offset[i], (r_new[0][0], r_new[1][0], r_new[2][0]))
-    tensor = np.zeros((3, 3))
-    tensor[0, 0] = tensor[1, 1] = tensor[2, 2] = pace = 2.0 * line.mass[i] / (h * h)
+    pace = 2.0 * line.mass[i] / (h * h)
+    for a in range(3):
+        for b in range(3):
+            tensor[a, b] = pace if a == b else 0.0
     gain = (
         pace * (move[0] - h * velocity[i, 0]),
         pace * (move[1] - h * velocity[i, 1]),
@@ -84,18 +84,18 @@ def add_node(line, i, h, quaternion, velocity, rate, flow, x, fresh, block, resi
             for k in range(3):
                 block[3 + a, 3 + b] += (2.0 * j[k] / (h * h) + c[k] / h) * r_mid[a][k] * r_mid[b][k]
     if line.added_mass.shape[0] > 0:
-        _add_added_mass(line.added_mass[i], h, flow[i], r_mid, scale(1.0 / h, turn), arm, arm_new, move, fresh, block, residual)
+        _add_added_mass(line.added_mass[i], h, flow[i], r_mid, scale(1.0 / h, turn), arm, arm_new, move, fresh, block, residual, tensor)
 
 
-@kernel
-def _add_added_mass(m, h, flow, r_mid, spin_t, arm, arm_new, move, fresh, block, residual):
+@inner
+def _add_added_mass(m, h, flow, r_mid, spin_t, arm, arm_new, move, fresh, block, residual, tensor):
     """Added mass `m` (3,) of one node in the section's frame (Kirchhoff's equations); `flow` (3,) its old velocity there."""
     v = apply_transposed(r_mid, scale(1.0 / h, move))
     p = (m[0] * v[0], m[1] * v[1], m[2] * v[2])
     rate = (2.0 * m[0] * (v[0] - flow[0]) / h, 2.0 * m[1] * (v[1] - flow[1]) / h, 2.0 * m[2] * (v[2] - flow[2]) / h)
-    tensor = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):
+            tensor[a, b] = 0.0
             for k in range(3):
                 tensor[a, b] += 2.0 * m[k] / (h * h) * r_mid[a][k] * r_mid[b][k]
     _add_lever(arm, arm_new, tensor, apply(r_mid, add(rate, cross(spin_t, p))), fresh, block, residual)
@@ -113,7 +113,7 @@ def _add_added_mass(m, h, flow, r_mid, spin_t, arm, arm_new, move, fresh, block,
             block[3 + b, a] += bent[b]
 
 
-@kernel
+@inner
 def advance(line, h, quaternion, velocity, rate, flow, x, new_quaternion, new_velocity, new_rate, new_flow):
     """Attitudes, velocities, body rates and added-mass velocities after the increments x (n, 6)."""
     for i in range(x.shape[0]):

@@ -20,11 +20,12 @@ class Pipe:
     def __init__(self, parameters: PipeParameters) -> None:
         self.parameters = model.resolve(parameters)
         self.s, self.line = model.discretize(self.parameters)
+        self.water = model.waters(self.parameters)
         self.wall = recovery.wall(parameters, self.s)
 
     def equilibrium(self, top: tuple[float, float, float], attitude: Array | None, time: float = 0.0) -> Equilibrium:
         """Static equilibrium with the top at `top` (3,) [m], e, its section at `attitude` (4,), or as it hangs if None."""
-        return statics.solve(self.line, self.s, model.water(self.parameters, time), top, attitude)
+        return statics.solve(self.line, self.s, self.water(time), top, attitude)
 
     def start(self, time: float) -> tuple[Equilibrium, PipeState]:
         """Equilibrium at the parameters' own top pose, and the state of rest in it."""
@@ -40,7 +41,7 @@ class Pipe:
         """Step of h [s] with the top's mean velocity and angular velocity (3,), e, or those without the pipe of a top that yields to
         its pull with `mobility` (6, 6); the water is that of mid-step.
         """
-        return integrator.step(self.line, model.water(self.parameters, state.time + 0.5 * h), state, velocity, spin, h, mobility)
+        return integrator.step(self.line, self.water(state.time + 0.5 * h), state, velocity, spin, h, mobility)
 
     def energies(self, state: PipeState) -> tuple[float, float, float, float]:
         """(kinetic, elastic, gravity, contact) [J]."""
@@ -48,7 +49,7 @@ class Pipe:
 
     def section_forces(self, state: PipeState) -> SectionForces:
         """Section forces at the nodes, material components."""
-        water = model.water(self.parameters, state.time)
+        water = self.water(state.time)
         wrenches = recovery.nodal_wrenches(self.line, water, state.position, state.quaternion, state.velocity, state.strain)
         return SectionForces.of(wrenches)
 
@@ -59,11 +60,11 @@ class Pipe:
 
     def von_mises(self, state: PipeState, forces: SectionForces) -> Array:
         """Largest von Mises stress (n,) [Pa] over the wall at every node."""
-        return recovery.von_mises(self.parameters, self.wall, state.position, forces)
+        return recovery.von_mises(self.wall, state.position, forces)
 
     def wall_tension(self, state: PipeState, forces: SectionForces) -> Array:
         """Force (n,) [N] in the wall at every node."""
-        return recovery.wall_tension(self.parameters, self.wall, state.position, forces)
+        return recovery.wall_tension(self.wall, state.position, forces)
 
     def largest_bending_moment(self, forces: SectionForces) -> float:
         """Largest bending moment [N m] along the line, between the nodes too."""

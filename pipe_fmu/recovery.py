@@ -11,13 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from .assembly import expand
-from .compiled import kernel
+from .compiled import inner
 from .element import ROWS, STRAINS, frame, gradients
-from .line import Array
+from .line import Array, Line, Water
 from .loads import add_contact, add_drag
 from .parameters import PipeParameters
 from .so3 import apply_transposed, matrix
 from .static_kernel import chord, spin
+
+_SAMPLES = 16  # parts of an element
 
 
 class SectionForces(NamedTuple):
@@ -30,7 +32,7 @@ class SectionForces(NamedTuple):
     @classmethod
     def of(cls, wrenches: Array) -> "SectionForces":
         """From nodal wrenches (n, 6)."""
-        return cls(wrenches[:, 0], wrenches[:, 1:3], wrenches[:, 3:])
+        return cls(wrenches[:, 0].copy(), wrenches[:, 1:3].copy(), wrenches[:, 3:].copy())
 
 
 def largest_bending_moment(s: Array, forces: SectionForces) -> float:
@@ -38,27 +40,37 @@ def largest_bending_moment(s: Array, forces: SectionForces) -> float:
 
     |m|^2 is a cubic in every element: its slope at the nodes is 2 (m_2 n_3 - m_3 n_2) by eq. (26).
     """
-    m2, m3 = forces.moment[:, 1], forces.moment[:, 2]
-    square = m2 * m2 + m3 * m3
-    slope = 2.0 * (m2 * forces.shear[:, 1] - m3 * forces.shear[:, 0])
-    h = np.diff(s)
-    a, b, da, db = square[:-1], square[1:], slope[:-1] * h, slope[1:] * h
-    x = np.linspace(0.0, 1.0, 17)[:, None]
-    cubic = a + x * (da + x * (3.0 * (b - a) - 2.0 * da - db + x * (2.0 * (a - b) + da + db)))
-    return math.sqrt(float(cubic.max()))
+    return math.sqrt(_largest_square(s, forces.moment, forces.shear))
 
 
-@kernel
-def nodal_wrenches(line, water, position, quaternion, velocity, strain):
-    """Spatial section force and moment (n, 6) at the nodes, on the side towards the top."""
+@inner
+def _largest_square(s, moment, shear):
+    largest = 0.0
+    for e in range(s.shape[0] - 1):
+        h = s[e + 1] - s[e]
+        a = moment[e, 1] ** 2 + moment[e, 2] ** 2
+        b = moment[e + 1, 1] ** 2 + moment[e + 1, 2] ** 2
+        da = 2.0 * h * (moment[e, 1] * shear[e, 1] - moment[e, 2] * shear[e, 0])
+        db = 2.0 * h * (moment[e + 1, 1] * shear[e + 1, 1] - moment[e + 1, 2] * shear[e + 1, 0])
+        for k in range(_SAMPLES + 1):
+            x = k / _SAMPLES
+            largest = max(largest, a + x * (da + x * (3.0 * (b - a) - 2.0 * da - db + x * (2.0 * (a - b) + da + db))))
+    return largest
+
+
+def nodal_wrenches(line: Line, water: Water, position: Array, quaternion: Array, velocity: Array, strain: Array) -> Array:
+    """Section force and moment (n, 6) at the nodes, material components."""
+    out = np.zeros((len(position), 6))
+    elemental = np.empty((ROWS, 9)), np.empty((12, 12)), np.empty((2, 3, 12)), np.zeros((2, 6)), np.empty((3, 12))
+    _nodal_wrenches(line, water, position, quaternion, velocity, strain, out, elemental)
+    return out
+
+
+@inner
+def _nodal_wrenches(line, water, position, quaternion, velocity, strain, out, elemental):
+    rows, unused, scratch, ends, vectors = elemental
+    nine, vector, depths = vectors[0, :9], vectors[1], vectors[2]
     n = position.shape[0]
-    out = np.zeros((n, 6))
-    rows = np.empty((ROWS, 9))
-    nine = np.empty(9)
-    vector = np.empty(12)
-    unused = np.empty((12, 12))
-    ends = np.zeros((2, 6))
-    depths = np.empty(2)
     for e in range(n - 1):
         h = line.length[e]
         rm, u, psi = frame(spin(quaternion, e), spin(quaternion, e + 1), chord(position, e))
@@ -76,9 +88,10 @@ def nodal_wrenches(line, water, position, quaternion, velocity, strain):
         if water.drag:
             for i in range(3):
                 ends[0, i], ends[1, i] = velocity[e, i], velocity[e + 1, i]
-            add_drag(rm, u, psi, h, line.drag[e], ends, depths, water.levels, water.velocities, 0.0, False, vector, unused)
+            add_drag(rm, u, psi, h, line.drag[e], ends, depths, water.levels, water.velocities, 0.0, False, vector, unused, scratch)
         if line.bed.shape[0] > 0:
-            add_contact(h, line.diameter[e], line.weight[e], depths[0], depths[1], strain[e, STRAINS], rows[STRAINS], vector, unused)
+            sag = strain[e, STRAINS]
+            add_contact(h, line.diameter[e], line.weight[e], depths[0], depths[1], sag, rows[STRAINS], vector, unused, scratch)
         for i in range(6):
             out[e, i] -= vector[i] * (1.0 if e == 0 else 0.5)
             out[e + 1, i] += vector[6 + i] * (1.0 if e == n - 2 else 0.5)
@@ -89,7 +102,6 @@ def nodal_wrenches(line, water, position, quaternion, velocity, strain):
         for i in range(3):
             out[k, i] = force[i]
             out[k, 3 + i] = moment[i]
-    return out
 
 
 def centreline_length(line_length: Array, strain: Array) -> float:
@@ -98,7 +110,7 @@ def centreline_length(line_length: Array, strain: Array) -> float:
 
 
 class Wall(NamedTuple):
-    """Tube wall and pressures at the nodes, for the stress; (n,) each. `area` is 0 where a section has no wall."""
+    """Tube wall at the nodes and pressures on it, for the stress; (n,) each. `area` is 0 where a section has no wall."""
 
     area: Array  # m2
     second_moment: Array  # m4
@@ -106,10 +118,13 @@ class Wall(NamedTuple):
     outer: Array  # m
     displaced: Array  # A_e, m2
     contents: Array  # weight per volume of the contents, N/m3
+    water: float  # that of the water
+    depth: float  # m
 
 
 def wall(parameters: PipeParameters, s: Array) -> Wall:
     """Wall at the nodes `s` (n,)."""
+    environment = parameters.environment
     ends = np.cumsum([section.length or parameters.length for section in parameters.all_sections])
     at = [parameters.all_sections[min(int(np.searchsorted(ends, x - 1e-9)), len(ends) - 1)] for x in s]
     columns = [
@@ -118,47 +133,65 @@ def wall(parameters: PipeParameters, s: Array) -> Wall:
             one.second_moment,
             *one.radii,
             one.outer_area,
-            one.contents_density * parameters.environment.gravity,
+            one.contents_density * environment.gravity,
         )
         for one in at
     ]
-    return Wall(*np.array(columns).T)
+    return Wall._make([*np.array(columns).T.copy(), environment.water_density * environment.gravity, environment.depth])
 
 
-def pressures(parameters: PipeParameters, wall: Wall, position: Array) -> tuple[Array, Array]:
-    """Pressure outside and, of what fills the pipe, inside [Pa], (n,) each, at depths below the surface."""
-    environment = parameters.environment
-    depth = np.maximum(0.0, position[:, 2] + environment.depth)
-    return environment.water_density * environment.gravity * depth, wall.contents * depth
-
-
-def wall_tension(parameters: PipeParameters, wall: Wall, position: Array, forces: SectionForces) -> Array:
+def wall_tension(wall: Wall, position: Array, forces: SectionForces) -> Array:
     """Force (n,) [N] in the wall: effective tension - p_e A_e + p_i A_i. Nodes of sections without a wall have the effective tension."""
-    outside, inside = pressures(parameters, wall, position)
-    closed = inside * math.pi * wall.inner**2 - outside * wall.displaced
-    return forces.tension + np.where(wall.area > 0.0, closed, 0.0)
+    out = np.empty(len(wall.area))
+    _wall_tension(wall, position, forces.tension, out)
+    return out
 
 
-def von_mises(parameters: PipeParameters, wall: Wall, position: Array, forces: SectionForces) -> Array:
+def von_mises(wall: Wall, position: Array, forces: SectionForces) -> Array:
     """Largest von Mises stress (n,) [Pa] over the wall of a tube at every node: tension, bending, torsion and water pressure.
 
     Thick-walled tube (Lame) under the pressure outside and, where the pipe is filled, the head of its contents inside. Nodes of sections
     without a wall have stress 0.
     """
-    if not wall.area.any():
-        return np.zeros(len(wall.area))
-    outside, inside = pressures(parameters, wall, position)
-    a, b, area = wall.inner, wall.outer, np.where(wall.area > 0.0, wall.area, np.inf)
-    second = np.where(wall.area > 0.0, wall.second_moment, np.inf)
-    axial = wall_tension(parameters, wall, position, forces) / area
-    mean = (inside * a**2 - outside * b**2) * math.pi / area
-    largest = np.zeros(len(area))
-    for r in (a, b):
-        swing = (inside - outside) * math.pi * b**2 / area * np.where(r > 0.0, (a / np.maximum(r, 1e-9)) ** 2, 0.0)
-        radial, hoop = mean - swing, mean + swing
-        bending = np.hypot(forces.moment[:, 1], forces.moment[:, 2]) * r / second
-        twist = forces.moment[:, 0] * r / (2.0 * second)
-        for side in (axial + bending, axial - bending):
-            squares = (side - hoop) ** 2 + (hoop - radial) ** 2 + (radial - side) ** 2
-            largest = np.maximum(largest, np.sqrt(0.5 * squares + 3.0 * twist**2))
-    return largest
+    out = np.empty(len(wall.area))
+    _von_mises(wall, position, forces.tension, forces.moment, out)
+    return out
+
+
+@inner
+def _pressures(wall, z, i):
+    """Pressure outside and, of what fills the pipe, inside [Pa] of node i, at its depth below the surface."""
+    depth = max(0.0, z + wall.depth)
+    return wall.water * depth, wall.contents[i] * depth
+
+
+@inner
+def _wall_tension(wall, position, tension, out):
+    for i in range(out.shape[0]):
+        outside, inside = _pressures(wall, position[i, 2], i)
+        out[i] = tension[i]
+        if wall.area[i] > 0.0:
+            out[i] += inside * math.pi * wall.inner[i] ** 2 - outside * wall.displaced[i]
+
+
+@inner
+def _von_mises(wall, position, tension, moment, out):
+    _wall_tension(wall, position, tension, out)
+    for i in range(out.shape[0]):
+        area, a, b = wall.area[i], wall.inner[i], wall.outer[i]
+        if area == 0.0:
+            out[i] = 0.0
+            continue
+        outside, inside = _pressures(wall, position[i, 2], i)
+        axial = out[i] / area
+        mean = (inside * a**2 - outside * b**2) * math.pi / area
+        largest = 0.0
+        for r in (a, b):
+            swing = (inside - outside) * math.pi * b**2 / area * ((a / r) ** 2 if r > 0.0 else 0.0)
+            radial, hoop = mean - swing, mean + swing
+            bending = math.hypot(moment[i, 1], moment[i, 2]) * r / wall.second_moment[i]
+            twist = moment[i, 0] * r / (2.0 * wall.second_moment[i])
+            for side in (axial + bending, axial - bending):
+                squares = (side - hoop) ** 2 + (hoop - radial) ** 2 + (radial - side) ** 2
+                largest = max(largest, 0.5 * squares + 3.0 * twist**2)
+        out[i] = math.sqrt(largest)

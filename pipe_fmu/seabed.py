@@ -10,10 +10,10 @@ so that a pipe lying at z = 0 is carried by exactly its weight (published pipela
 
 import math
 
-from .compiled import kernel
+from .compiled import inner
 
 
-@kernel
+@inner
 def contact(z, diameter, weight):
     """Potential [J/m], force [N/m, upward positive] and stiffness [N/m^2] of the bed on a pipe at depth coordinate z."""
     p = z + 0.125 * diameter
@@ -30,7 +30,7 @@ def contact(z, diameter, weight):
     return foot + 0.5 * stiffness * (q * q - at_knee * at_knee), stiffness * q, stiffness
 
 
-@kernel
+@inner
 def mean_contact(z_old, z_new, diameter, weight):
     """Mean of the force over the way from one position to another, a discrete gradient, and its derivative with respect to z_new.
 

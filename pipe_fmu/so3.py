@@ -7,37 +7,37 @@ exp(theta + d)` to first order in d. Source: Crisfield and Jelenic (1999), secti
 
 import math
 
-from .compiled import kernel
+from .compiled import inner
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-@kernel
+@inner
 def add(a, b):
     """Sum of two vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@kernel
+@inner
 def scale(s, a):
     """A number times a vector."""
     return (s * a[0], s * a[1], s * a[2])
 
 
-@kernel
+@inner
 def dot(a, b):
     """Inner product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@inner
 def cross(a, b):
     """Vector product a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@kernel
+@inner
 def multiply(p, q):
     """Product of two quaternions: first q, then p."""
     return (
@@ -48,13 +48,13 @@ def multiply(p, q):
     )
 
 
-@kernel
+@inner
 def conjugate(q):
     """Inverse of a unit quaternion."""
     return (q[0], -q[1], -q[2], -q[3])
 
 
-@kernel
+@inner
 def exp(theta):
     """Quaternion of a rotation vector [rad]."""
     half = 0.5 * math.sqrt(dot(theta, theta))
@@ -67,7 +67,7 @@ def exp(theta):
     return (c, k * theta[0], k * theta[1], k * theta[2])
 
 
-@kernel
+@inner
 def log(q):
     """Rotation vector [rad], at most pi long, of a unit quaternion."""
     sign = -1.0 if q[0] < 0.0 else 1.0
@@ -76,7 +76,7 @@ def log(q):
     return (k * q[1], k * q[2], k * q[3])
 
 
-@kernel
+@inner
 def root(q):
     """Half of the rotation q: the quaternion of `log(q) / 2`."""
     sign = -1.0 if q[0] < 0.0 else 1.0
@@ -85,14 +85,14 @@ def root(q):
     return (w * n, sign * q[1] * n, sign * q[2] * n, sign * q[3] * n)
 
 
-@kernel
+@inner
 def normalize(q):
     """Quaternion scaled to unit length."""
     n = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return (q[0] * n, q[1] * n, q[2] * n, q[3] * n)
 
 
-@kernel
+@inner
 def matrix(q):
     """Rotation matrix of a unit quaternion as three rows."""
     w, x, y, z = q
@@ -103,13 +103,13 @@ def matrix(q):
     )
 
 
-@kernel
+@inner
 def apply(m, v):
     """Matrix (three rows) times vector."""
     return (dot(m[0], v), dot(m[1], v), dot(m[2], v))
 
 
-@kernel
+@inner
 def apply_transposed(m, v):
     """Transposed matrix (three rows) times vector."""
     return (
@@ -119,7 +119,7 @@ def apply_transposed(m, v):
     )
 
 
-@kernel
+@inner
 def left_jacobian_transposed(theta, v):
     """J_l(theta)^T v, J_l the left Jacobian of the exponential map."""
     z = dot(theta, theta)

@@ -3,12 +3,12 @@
 import numpy as np
 
 from .assembly import add_matrix, add_outer, add_vector, clear, expand, expand_matrix
-from .compiled import kernel
+from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, strains
 from .loads import add_contact, add_drag
 
 
-@kernel
+@inner
 def chord(position, e):
     """phi_2 - phi_1 of element e."""
     return (
@@ -18,7 +18,7 @@ def chord(position, e):
     )
 
 
-@kernel
+@inner
 def spin(quaternion, i):
     """Quaternion of node i as a tuple."""
     return (quaternion[i, 0], quaternion[i, 1], quaternion[i, 2], quaternion[i, 3])
@@ -41,6 +41,7 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
     matrix = np.empty((12, 12))
     still = np.zeros((2, 6))
     depths = np.empty(2)
+    scratch = np.empty((2, 3, 12))
     elastic, gravity, pressed = 0.0, 0.0, 0.0
     for e in range(line.length.shape[0]):
         h = line.length[e]
@@ -66,10 +67,10 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
         vector[8] -= 0.5 * weight
         depths[0], depths[1] = position[e, 2], position[e + 1, 2]
         if water.drag and water.levels.shape[0] > 0:
-            add_drag(rm, u, psi, h, line.drag[e], still, depths, water.levels, water.velocities, 0.0, True, vector, matrix)
+            add_drag(rm, u, psi, h, line.drag[e], still, depths, water.levels, water.velocities, 0.0, True, vector, matrix, scratch)
         if line.bed.shape[0] > 0:
             pressed += add_contact(
-                h, line.diameter[e], line.weight[e], depths[0], depths[1], strain[STRAINS], rows[STRAINS], vector, matrix
+                h, line.diameter[e], line.weight[e], depths[0], depths[1], strain[STRAINS], rows[STRAINS], vector, matrix, scratch
             )
         add_vector(residual, e, vector)
         add_matrix(diagonal, lower, upper, e, matrix)

@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from .assembly import add_matrix, add_outer, add_vector, clear, expand, expand_matrix
-from .compiled import kernel
+from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, resultant, strains
 from .loads import add_drag, add_mean_contact
 from .node_kernel import CONTACT, CURRENT, DRAG, INTERNAL, NUMERICAL, add_node, turn_columns, vector_of
@@ -37,7 +37,7 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 _CLOSURE_ANGLE = 0.02  # rad per step; below it three Gauss points are exact to round-off
 
 
-@kernel
+@inner
 def element_strains(line, position, quaternion, out):
     """Strains and sags (n - 1, 7) of a configuration."""
     for e in range(line.length.shape[0]):
@@ -54,32 +54,34 @@ def step_system(line, water, h, position, quaternion, velocity, rate, flow, stra
     position, velocity (n, 3), quaternion (n, 4), rate (n, 3) body rates, flow (n, 3) or (0, 3) body velocity of the added mass,
     strain (n - 1, 7): old state. Fills new_strain (n - 1, 7) and works (6,). Returns (force scale [N], moment scale [N m]).
     """
+    n = x.shape[0]
+    turned = np.empty((4, n, 4))
+    elemental = np.empty((3, ROWS, 9)), np.empty((9, 9)), np.empty((12, 12)), np.empty((2, 3, 12)), np.empty((2, 6)), np.empty((8, 12))
+    old = (position, quaternion, velocity, rate, flow, strain)
+    return _assemble(line, water, h, old, x, new_strain, fresh, sharp, system, works, turned, elemental)
+
+
+@inner
+def _assemble(line, water, h, old, x, new_strain, fresh, sharp, system, works, turned, elemental):
+    """`step_system` with its scratch: `turned` (4, n, 4) attitudes on the path, and arrays of one element."""
+    position, quaternion, velocity, rate, flow, strain = old
     diagonal, lower, upper, residual = system
     if fresh:
         clear(diagonal, lower, upper)
     residual[:] = 0.0
     works[:] = 0.0
     n = x.shape[0]
-    turned = np.empty((4, n, 4))
     for i in range(n):
         theta, q = vector_of(x, i, 3), spin(quaternion, i)
         for g in range(4):
             at = multiply(exp(scale(_PATH[g], theta)), q)
             for a in range(4):
                 turned[g, i, a] = at[a]
-    rows = np.empty((ROWS, 9))
-    mean = np.empty((ROWS, 9))
-    new = np.empty((ROWS, 9))
-    stress = np.empty(ROWS)
-    nine = np.empty(9)
-    square = np.empty((9, 9))
-    vector = np.empty(12)
-    twelve = np.empty((12, 12))
-    ends = np.empty((2, 6))
-    depths = np.empty(2)
-    old_z = np.empty(3)
-    new_z = np.empty(3)
-    motion = np.empty(9)
+    operators, square, twelve, scratch, ends, vectors = elemental
+    rows, mean, new = operators[0], operators[1], operators[2]
+    stress, nine, vector, depths = vectors[0], vectors[1, :9], vectors[2], vectors[3]
+    old_z, new_z, motion = vectors[4], vectors[5], vectors[6]
+    tensor = scratch[0, :, :3]
     force_scale, moment_scale = 0.0, 0.0
     for e in range(n - 1):
         length = line.length[e]
@@ -146,8 +148,9 @@ def step_system(line, water, h, position, quaternion, velocity, rate, flow, stra
         if water.drag:
             depths[0] = position[e, 2] + 0.5 * x[e, 2]
             depths[1] = position[e + 1, 2] + 0.5 * x[e + 1, 2]
+            stream = water.levels, water.velocities
             dissipated, supplied = add_drag(
-                middle, u_mid, psi_mid, length, line.drag[e], ends, depths, water.levels, water.velocities, 1.0 / h, fresh, vector, twelve
+                middle, u_mid, psi_mid, length, line.drag[e], ends, depths, *stream, 1.0 / h, fresh, vector, twelve, scratch
             )
             works[DRAG] += h * dissipated
             works[CURRENT] += h * supplied
@@ -169,12 +172,13 @@ def step_system(line, water, h, position, quaternion, velocity, rate, flow, stra
                 sharp,
                 vector,
                 twelve,
+                scratch,
             )
         add_vector(residual, e, vector)
         if fresh:
             add_matrix(diagonal, lower, upper, e, twelve)
     for i in range(n):
-        add_node(line, i, h, quaternion, velocity, rate, flow, x, fresh, diagonal[i], residual[i], works)
+        add_node(line, i, h, quaternion, velocity, rate, flow, x, fresh, diagonal[i], residual[i], works, tensor)
         theta = vector_of(x, i, 3)
         if fresh and dot(theta, theta) > 1e-8:
             turn_columns(theta, diagonal[i])
@@ -185,7 +189,7 @@ def step_system(line, water, h, position, quaternion, velocity, rate, flow, stra
     return force_scale, moment_scale
 
 
-@kernel
+@inner
 def _close(mean, motion, dd, t1, t2, length, old, new):
     """Make mean . motion = new - old exactly, by the least change along the relative motion of the ends."""
     norm = 0.0

@@ -11,6 +11,7 @@ from pipe_fmu import element, hydrodynamics, loads, seabed
 from pipe_fmu.environment import Current
 
 DIAMETER, WEIGHT = 0.4, 760.0
+SCRATCH = np.empty((2, 3, 12))
 LIFT_OFF, KNEE = -DIAMETER / 8, -DIAMETER / 8 + DIAMETER / 20
 
 
@@ -72,7 +73,7 @@ def test_element_on_the_bed_has_the_gradient_of_its_potential():
         strain, rows = np.empty(7), np.empty((7, 9))
         element.strains(rm, u, psi, h, share, strain)
         element.gradients(rm, u, psi, h, share, rows)
-        return loads.add_contact(h, DIAMETER, WEIGHT, z1 + x[2], z1 + d[2] + x[8], strain[6], rows[6], vector, np.zeros((12, 12)))
+        return loads.add_contact(h, DIAMETER, WEIGHT, z1 + x[2], z1 + d[2] + x[8], strain[6], rows[6], vector, np.zeros((12, 12)), SCRATCH)
 
     force = np.zeros(12)
     energy = potential(np.zeros(12), force)
@@ -90,7 +91,7 @@ def mean_contact(bed, ends, new_z, dt=0.1):
     row = np.zeros(9)
     old_z = np.array([-0.02, 0.01, 0.005])
     sides = np.array(bed), old_z, np.array(new_z), ends, row, row
-    lost = loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, *sides, True, True, vector, matrix)
+    lost = loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, *sides, True, True, vector, matrix, SCRATCH)
     return lost, vector
 
 
@@ -144,7 +145,7 @@ def test_tangent_of_the_friction_is_the_derivative_by_the_way_slid():
         vector, matrix = np.zeros(12), np.zeros((12, 12))
         z, row = np.array([-0.02, 0.01, 0.005]), np.zeros(9)
         bed = np.array([0.0, 0.5, 1e-3])
-        loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, bed, z, z, velocities, row, row, True, True, vector, matrix)
+        loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, bed, z, z, velocities, row, row, True, True, vector, matrix, SCRATCH)
         return vector, matrix
 
     _, tangent = sliding(ends)
@@ -196,7 +197,7 @@ def element_drag(ends, current, d=(10.0, 0.0, 0.0), q1=(1.0, 0.0, 0.0, 0.0), q2=
     levels = np.array([-800.0, 0.0])
     flow = np.array([current, current], dtype=float)
     power = loads.add_drag(
-        rm, u, psi, 10.0, np.array([7.0, 200.0]), ends, np.array([-50.0, -40.0]), levels, flow, rate, True, vector, matrix
+        rm, u, psi, 10.0, np.array([7.0, 200.0]), ends, np.array([-50.0, -40.0]), levels, flow, rate, True, vector, matrix, SCRATCH
     )
     return power, vector, matrix
 
@@ -244,7 +245,7 @@ def test_current_on_an_arc_is_that_at_the_depth_of_its_points():
     levels, flow = np.array([-51.0, -49.0]), np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
     vector, matrix = np.zeros(12), np.zeros((12, 12))
     depths = np.array([-50.0, -50.0])
-    loads.add_drag(*frame, 10.0, np.array([7.0, 200.0]), np.zeros((2, 6)), depths, levels, flow, 0.0, True, vector, matrix)
+    loads.add_drag(*frame, 10.0, np.array([7.0, 200.0]), np.zeros((2, 6)), depths, levels, flow, 0.0, True, vector, matrix, SCRATCH)
     assert vector[1] + vector[7] == pytest.approx(-10.0 * 200.0 * (2.0 / 6.0) ** 2, rel=1e-12)  # x (1 - x) = 1 / 6 at the Gauss points
 
 

@@ -65,7 +65,7 @@ def test_largest_ports_are_the_largest_nodal_values_and_the_end_wrench_is_the_pu
     n = 48
     moment = unit.output("node_moment").reshape(n, 3)
     at_nodes = np.hypot(moment[:, 1], moment[:, 2]).max()
-    assert at_nodes <= unit.output("largest_bending_moment")[0] <= 1.05 * at_nodes
+    assert at_nodes * (1.0 - 1e-14) <= unit.output("largest_bending_moment")[0] <= 1.05 * at_nodes  # to round-off
     assert unit.output("largest_tension")[0] == unit.output("node_tension").max()
     np.testing.assert_allclose(unit.output("end_force"), unit.output("force"), rtol=1e-7, atol=1.0)
     np.testing.assert_allclose(unit.output("end_moment"), unit.output("moment"), rtol=1e-5, atol=1.0)
