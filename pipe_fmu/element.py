@@ -8,20 +8,22 @@ R_m = R_1 exp(psi / 2) half way between the ends, everything the element feels i
 Strains (the order of the rows of `stiffness` and of the gradients):
 
     0  e   = length of the element's centreline / h - 1     extension, eq. (17)
-    1  g_2 = u_2 / h,   2  g_3 = u_3 / h                    shear of the chord against the mid frame
-    3  k_1 = psi_1 / h + (p_2 psi_2 u_2 + p_3 psi_3 u_3) / h^2   twist
-    4  k_2 = psi_2 / h, 5  k_3 = psi_3 / h                  bending
+    1  g_2 = w_2 / h,   2  g_3 = w_3 / h                    shear of the chord against the mid frame, w = u - psi_1 u_1 psi / 24
+    3  k_1 = (psi_1 + p_2 psi_2 g_2 + p_3 psi_3 g_3) / h    twist
+    4  k_2 = (psi_2 - p_2 psi_1 g_2) / h,   5  k_3 = (psi_3 - p_3 psi_1 g_3) / h     bending
     6  c_z = e3 . (d x R_m psi) / 2                         sag of the arc below the chord (loads, not strain)
 
 For a constant strain the centreline is a helix (log of the relative frame on SE(3)) whose length is
-l^2 = P |u|^2 - G (psi.u)^2, P = rho^2, G = (P - 1) / |psi|^2, rho = a / sin a, a = |psi| / 2. A bending moment that varies
+l^2 = P |u|^2 - G (psi.u)^2, P = rho^2, G = (P - 1) / |psi|^2, rho = a / sin a, a = |psi| / 2; bent and
+twisted at once, its chord leaves the mid frame by psi_1 psi / 24 (to third order), which is no shear. A bending moment that varies
 over the element (shear force Q, kappa' = Q / EI) bends it to an S: the chord leaves the mid frame by h^2 kappa' / 12, the
-centreline grows by a tenth of that angle squared, and the log picks up the twist kappa x kappa' h^2 / 12 (second term of the
-Magnus series). So the chord's shear flexibility is 1/K = 1/GA + h^2 / (12 EI), p = (h^2 / 12 EI) K is the share that is bending,
+centreline grows by a tenth of that angle squared, and the log loses h^2 / 12 kappa x kappa' (second term of the Magnus series), which
+k_1, k_2, k_3 give back. So the chord's shear flexibility is 1/K = 1/GA + h^2 / (12 EI), p = (h^2 / 12 EI) K is the share that is bending,
 and the energy h/2 (EA e^2 + K g^2 + GJ k_1^2 + EI k^2) is that of the bar with linearly varying moment. Departures from
 the plain law (20): the extension is measured along the centreline, not along t_1; they differ by g^2/2, g the physical shear
-strain (1e-10 in a pipe). The reward is fourth order with two nodes, no shear locking, and a tension that never shears the
-section away, however long the element. (Residual bending flexibility: MacNeal 1978; SE(3) element: Sonneville et al. 2014.)
+strain (1e-10 in a pipe). The reward is fourth order with two nodes under any forces and torque, no shear locking, and a tension that
+never shears the section away, however long the element. Only where EI_2 and EI_3 differ, and the line is bent about both axes at once, does
+the twist vary within an element, and the order is two. (Residual bending flexibility: MacNeal 1978; SE(3) element: Sonneville et al. 2014.)
 
 Variations, in the mid frame, from nu = R_m^T delta d, beta = R_m^T (theta_1 + theta_2) / 2, mu = R_m^T (theta_2 - theta_1), theta_i
 the spatial spins: delta psi = A^-1 mu with A^-1 = rho I - chi psi psi^T, chi = (rho - 1) / |psi|^2; spin of the mid frame
@@ -36,6 +38,7 @@ from .so3 import add, apply, apply_transposed, conjugate, cross, dot, log, matri
 
 STRAINS = 6
 ROWS = 7
+_COIL = 1.0 / 24.0  # of the chord of a line bent and twisted at once
 
 
 @inner
@@ -86,14 +89,15 @@ def strains(rm, u, psi, h, share, out):
     rho = 1.0 + z * chi
     along = dot(psi, u)
     length = math.sqrt(rho * rho * dot(u, u) - chi * (rho + 1.0) * along * along)
-    g2, g3 = u[1] / h, u[2] / h
+    coil = _COIL * psi[0] * u[0]
+    g2, g3 = (u[1] - coil * psi[1]) / h, (u[2] - coil * psi[2]) / h
     p2, p3 = share[0], share[1]
     out[0] = (length - h) / h + 0.1 * (p2 * p2 * g2 * g2 + p3 * p3 * g3 * g3)
     out[1] = g2
     out[2] = g3
     out[3] = (psi[0] + p2 * psi[1] * g2 + p3 * psi[2] * g3) / h
-    out[4] = psi[1] / h
-    out[5] = psi[2] / h
+    out[4] = (psi[1] - p2 * psi[0] * g2) / h
+    out[5] = (psi[2] - p3 * psi[0] * g3) / h
     out[6] = 0.5 * dot(rm[2], cross(u, psi))
 
 
@@ -121,26 +125,41 @@ def gradients(rm, u, psi, h, share, out):
     x = dot(u, u)
     length = math.sqrt(rho * rho * x - big_g * along * along)
     p2, p3 = share[0], share[1]
-    hh = 1.0 / (h * h)
-    zero = (0.0, 0.0, 0.0)
+
+    coil = _COIL * psi[0] * u[0]
+    g2, g3 = (u[1] - coil * psi[1]) / h, (u[2] - coil * psi[2]) / h
+    turn, push = -_COIL * u[0] / h, -_COIL * psi[0] / h
+    n2, q2 = (push * psi[1], 1.0 / h, 0.0), (turn * psi[1], turn * psi[0], 0.0)
+    n3, q3 = (push * psi[2], 0.0, 1.0 / h), (turn * psi[2], 0.0, turn * psi[0])
+    _put(out[1], rm, n2, q2, cross(n2, u), psi, rho, chi, b)
+    _put(out[2], rm, n3, q3, cross(n3, u), psi, rho, chi, b)
 
     k = 1.0 / (h * length)
     n = add(scale(k * rho * rho, u), scale(-k * big_g * along, psi))
-    n = add(n, (0.0, 0.2 * p2 * p2 * u[1] * hh, 0.2 * p3 * p3 * u[2] * hh))
+    n = add(n, add(scale(0.2 * p2 * p2 * g2, n2), scale(0.2 * p3 * p3 * g3, n3)))
     q = add(scale(k * (2.0 * rho * rho1 * x - big_g1 * along * along), psi), scale(-k * big_g * along, u))
+    q = add(q, add(scale(0.2 * p2 * p2 * g2, q2), scale(0.2 * p3 * p3 * g3, q3)))
     _put(out[0], rm, n, q, cross(n, u), psi, rho, chi, b)
-    n = (0.0, 1.0 / h, 0.0)
-    _put(out[1], rm, n, zero, cross(n, u), psi, rho, chi, b)
-    n = (0.0, 0.0, 1.0 / h)
-    _put(out[2], rm, n, zero, cross(n, u), psi, rho, chi, b)
-    n = (0.0, p2 * psi[1] * hh, p3 * psi[2] * hh)
-    _put(out[3], rm, n, (1.0 / h, p2 * u[1] * hh, p3 * u[2] * hh), cross(n, u), psi, rho, chi, b)
-    _put(out[4], rm, zero, (0.0, 1.0 / h, 0.0), zero, psi, rho, chi, b)
-    _put(out[5], rm, zero, (0.0, 0.0, 1.0 / h), zero, psi, rho, chi, b)
+    n = add(scale(p2 * psi[1] / h, n2), scale(p3 * psi[2] / h, n3))
+    q = add(scale(p2 * psi[1] / h, q2), scale(p3 * psi[2] / h, q3))
+    q = add(q, (1.0 / h, p2 * g2 / h, p3 * g3 / h))
+    _put(out[3], rm, n, q, cross(n, u), psi, rho, chi, b)
+    n, q = scale(-p2 * psi[0] / h, n2), add(scale(-p2 * psi[0] / h, q2), (-p2 * g2 / h, 1.0 / h, 0.0))
+    _put(out[4], rm, n, q, cross(n, u), psi, rho, chi, b)
+    n, q = scale(-p3 * psi[0] / h, n3), add(scale(-p3 * psi[0] / h, q3), (-p3 * g3 / h, 0.0, 1.0 / h))
+    _put(out[5], rm, n, q, cross(n, u), psi, rho, chi, b)
     down = rm[2]
     n = scale(0.5, cross(psi, down))
     c = add(cross(n, u), scale(0.5, cross(cross(u, psi), down)))
     _put(out[6], rm, n, scale(0.5, cross(down, u)), c, psi, rho, chi, b)
+
+
+@inner
+def _shear(g2, g3, psi, h, p2, p3, stress):
+    """What is conjugate to w: the chord's shear force over h, with the parts of extension, twist and bending that go with it."""
+    n2 = stress[1] + 0.2 * stress[0] * p2 * p2 * g2 + p2 * (stress[3] * psi[1] - stress[4] * psi[0]) / h
+    n3 = stress[2] + 0.2 * stress[0] * p3 * p3 * g3 + p3 * (stress[3] * psi[2] - stress[5] * psi[0]) / h
+    return (0.0, n2 / h, n3 / h)
 
 
 @inner
@@ -155,18 +174,20 @@ def resultant(rm, u, psi, h, share, stress, out):
     along, x = dot(psi, u), dot(u, u)
     length = math.sqrt(rho * rho * x - big_g * along * along)
     p2, p3 = share[0], share[1]
-    hh = 1.0 / (h * h)
-    s0, s3, s6 = stress[0], stress[3], 0.5 * stress[6]
+    s0, s3, s4, s5, s6 = stress[0], stress[3], stress[4], stress[5], 0.5 * stress[6]
     arc = s0 / (h * length)
     down = rm[2]
+    coil = _COIL * psi[0] * u[0]
+    g2, g3 = (u[1] - coil * psi[1]) / h, (u[2] - coil * psi[2]) / h
+    shear = _shear(g2, g3, psi, h, p2, p3, stress)
+    bent = dot(shear, psi)
     n = add(scale(arc * rho * rho, u), scale(-arc * big_g * along, psi))
     n = add(n, scale(s6, cross(psi, down)))
-    n2 = (0.2 * s0 * p2 * p2 * u[1] + s3 * p2 * psi[1]) * hh + stress[1] / h
-    n3 = (0.2 * s0 * p3 * p3 * u[2] + s3 * p3 * psi[2]) * hh + stress[2] / h
-    n = add(n, (0.0, n2, n3))
+    n = add(n, (-_COIL * psi[0] * bent, shear[1], shear[2]))
     q = add(scale(arc * (2.0 * rho * rho1 * x - big_g1 * along * along), psi), scale(-arc * big_g * along, u))
     q = add(q, scale(s6, cross(down, u)))
-    q = add(q, (s3 / h, s3 * p2 * u[1] * hh + stress[4] / h, s3 * p3 * u[2] * hh + stress[5] / h))
+    q = add(q, ((s3 - p2 * g2 * s4 - p3 * g3 * s5) / h, (s3 * p2 * g2 + s4) / h, (s3 * p3 * g3 + s5) / h))
+    q = add(q, scale(-_COIL * u[0], (bent, psi[0] * shear[1], psi[0] * shear[2])))
     c = add(cross(n, u), scale(s6, cross(cross(u, psi), down)))
     _put(out, rm, n, q, c, psi, rho, chi, _half_spin(z)[0])
 
@@ -188,18 +209,21 @@ def geometric_stiffness(rm, u, psi, h, share, stress, out):
     y = along * along
     length = math.sqrt(big_p * x - big_g * y)
     p2, p3 = share[0], share[1]
-    hh = 1.0 / (h * h)
-    s0, s3, s6 = stress[0], stress[3], 0.5 * stress[6]
+    s0, s3, s4, s5, s6 = stress[0], stress[3], stress[4], stress[5], 0.5 * stress[6]
     down = rm[2]
+    coil = _COIL * psi[0] * u[0]
+    g2, g3 = (u[1] - coil * psi[1]) / h, (u[2] - coil * psi[2]) / h
+    shear = _shear(g2, g3, psi, h, p2, p3, stress)
+    bent = dot(shear, psi)
     arc = s0 / (h * length)
     half_u = add(scale(big_p, u), scale(-big_g * along, psi))  # half the gradient of l^2
     spread = big_p1 * x - big_g1 * y
     half_psi = add(scale(spread, psi), scale(-big_g * along, u))
     n = add(scale(arc, half_u), scale(s6, cross(psi, down)))
-    n = add(n, (0.0, (0.2 * s0 * p2 * p2 * u[1] + s3 * p2 * psi[1]) * hh, (0.2 * s0 * p3 * p3 * u[2] + s3 * p3 * psi[2]) * hh))
-    n = add(n, (0.0, stress[1] / h, stress[2] / h))
+    n = add(n, (-_COIL * psi[0] * bent, shear[1], shear[2]))
     q = add(scale(arc, half_psi), scale(s6, cross(down, u)))
-    q = add(q, (s3 / h, s3 * p2 * u[1] * hh + stress[4] / h, s3 * p3 * u[2] * hh + stress[5] / h))
+    q = add(q, ((s3 - p2 * g2 * s4 - p3 * g3 * s5) / h, (s3 * p2 * g2 + s4) / h, (s3 * p3 * g3 + s5) / h))
+    q = add(q, scale(-_COIL * u[0], (bent, psi[0] * shear[1], psi[0] * shear[2])))
     sagging = cross(u, psi)
     c = add(cross(n, u), scale(s6, cross(sagging, down)))
     psi_q = dot(psi, q)
@@ -227,17 +251,25 @@ def geometric_stiffness(rm, u, psi, h, share, stress, out):
         d_half_psi = add(d_half_psi, scale(-big_g * d_along - 2.0 * big_g1 * psi_dpsi * along, u))
         d_n = add(scale(arc, d_half_u), scale(-arc * d_length / length, half_u))
         d_n = add(d_n, scale(s6, add(cross(d_psi, down), cross(psi, d_down))))
-        d_n = add(
-            d_n,
-            (
-                0.0,
-                (0.2 * s0 * p2 * p2 * d_u[1] + s3 * p2 * d_psi[1]) * hh,
-                (0.2 * s0 * p3 * p3 * d_u[2] + s3 * p3 * d_psi[2]) * hh,
-            ),
+        d_coil = _COIL * (d_psi[0] * u[0] + psi[0] * d_u[0])
+        d_g2 = (d_u[1] - d_coil * psi[1] - coil * d_psi[1]) / h
+        d_g3 = (d_u[2] - d_coil * psi[2] - coil * d_psi[2]) / h
+        d_shear = (
+            0.0,
+            (0.2 * s0 * p2 * p2 * d_g2 + p2 * (s3 * d_psi[1] - s4 * d_psi[0]) / h) / h,
+            (0.2 * s0 * p3 * p3 * d_g3 + p3 * (s3 * d_psi[2] - s5 * d_psi[0]) / h) / h,
         )
+        d_bent = dot(d_shear, psi) + dot(shear, d_psi)
+        d_n = add(d_n, (-_COIL * (d_psi[0] * bent + psi[0] * d_bent), d_shear[1], d_shear[2]))
         d_q = add(scale(arc, d_half_psi), scale(-arc * d_length / length, half_psi))
         d_q = add(d_q, scale(s6, add(cross(d_down, u), cross(down, d_u))))
-        d_q = add(d_q, (0.0, s3 * p2 * d_u[1] * hh, s3 * p3 * d_u[2] * hh))
+        d_q = add(d_q, (-(s4 * p2 * d_g2 + s5 * p3 * d_g3) / h, s3 * p2 * d_g2 / h, s3 * p3 * d_g3 / h))
+        d_turn = (
+            _COIL * (d_u[0] * bent + u[0] * d_bent),
+            d_coil * shear[1] + coil * d_shear[1],
+            d_coil * shear[2] + coil * d_shear[2],
+        )
+        d_q = add(d_q, scale(-1.0, d_turn))
         d_c = add(cross(d_n, u), cross(n, d_u))
         d_sagging = add(cross(d_u, psi), cross(u, d_psi))
         d_c = add(d_c, scale(s6, add(cross(d_sagging, down), cross(sagging, d_down))))

@@ -196,14 +196,14 @@ def test_princeton_beam_experiment(force, angle):
 
     Published tip displacements: Ansys beam elements by Obrezkov et al. (Nonlinear Dynamics 109, 2022), as quoted in Exudyn's test models,
     for 508 x 12.3777 x 3.2024 mm, E = 71.7 GPa, nu = 0.31; shear and torsion factors not given, here 5/6 and Roark's: within 1.5 %
-    chordwise, 0.25 % flapwise. Against shooting, the tip's twist included: 4e-5 m and 2e-4 rad with 10 elements.
+    chordwise, 0.25 % flapwise. Against shooting, the tip's twist included: 4e-5 m and 2e-4 rad with 12 elements.
     """
-    s, line = bar(0.508, 11, **PRINCETON)
+    s, line = bar(0.508, 13, **PRINCETON)
     radians = math.radians(angle)
     load = force * np.array([0.0, math.cos(radians), math.sin(radians)])
     at = straight(s)
     for part in (0.25, 0.5, 0.75, 1.0):
-        at = clamped(line, *at, at_tip(11, part * load))
+        at = clamped(line, *at, at_tip(13, part * load))
     stiffness = [PRINCETON[key] for key in ("axial", "shear", "shear", "torsion", "bending", "bending_3")]
     exact, tip = cantilever(0.508, stiffness, at[1][-1], load)
     np.testing.assert_allclose(at[0][-1], exact, atol=4e-5)

@@ -122,12 +122,14 @@ def test_an_arc_and_a_twisted_bar_are_exact(share, strain, kappa):
 
 
 @pytest.mark.parametrize("kappa", [(0.1, 0.12, -0.05), (0.02, -0.3, 0.1), (0.3, 0.03, 0.02)])
-def test_length_and_bending_of_a_helix_are_exact_and_its_shear_second_order(kappa):
+def test_length_and_bending_of_a_helix_are_exact_and_its_shear_fourth_order(kappa):
+    """What is left of shear: psi_1 psi_2 |psi|^2 / 576 at most, by expansion of the exponential map."""
     kappa = np.array(kappa)
     q1, q2, d = helix(np.array([1.03, 0.0, 0.0]), kappa)
     got = strains(q1, q2, d, NO_SHARE)
     np.testing.assert_allclose(got[[0, 3, 4, 5]], [0.03, *kappa], atol=3e-15)
-    bound = LENGTH**2 * abs(kappa[0]) * math.hypot(kappa[1], kappa[2]) / 24 * 1.04  # 1 - sin a / a <= a^2 / 6
+    psi = LENGTH * kappa
+    bound = 1.03 * abs(psi[0]) * math.hypot(psi[1], psi[2]) * (psi @ psi) / 576
     assert np.hypot(got[1], got[2]) <= bound
 
 
