@@ -15,6 +15,7 @@ from .environment import Environment
 
 Vector3 = tuple[float, float, float]
 End = Literal["clamped", "pinned"]
+_SUBSTEPS = (1, 3, 9, 27, 81, 243, 729)
 
 
 @dataclass(frozen=True)
@@ -160,12 +161,15 @@ class PipeParameters:
     sections: tuple[Section, ...] = field(default=(), metadata={"doc": "sections from foot to top, instead of `section`"})
     internal_damping: float = number(0.0, "s", "Kelvin-Voigt time: viscous section forces are this times C strain rate", min=0.0)
     numerical_damping: float = number(0.0, "1", "algorithmic dissipation: 0 none, 0.5 backward Euler on the strains", min=0.0, max=0.5)
+    max_substeps: int = number(1, "1", "parts of a step that does not converge, a power of 3: for hosts without rollback", min=1, max=729)
     added_mass: AddedMass | None = None
     seabed: Seabed | None = None
     environment: Environment = field(default_factory=Environment, metadata={"doc": "sea and gravity"})
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.max_substeps not in _SUBSTEPS:
+            raise ValueError(f"max_substeps = {self.max_substeps}: must be one of {', '.join(map(str, _SUBSTEPS))}")
         if not self.sections and self.section.length not in (None, self.length):
             raise ValueError(f"section.length = {self.section.length:g}: must be absent, or the pipe's length {self.length:g} m")
         if self.sections:

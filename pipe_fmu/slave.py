@@ -1,9 +1,11 @@
 """The pipe as a co-simulation unit: names, units and meaning of its ports. Knows nothing of FMI; an adapter does the rest."""
 
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
+from . import substeps
 from .integrator import WORKS
 from .line import Array
 from .model import resolve
@@ -32,6 +34,8 @@ class PipeUnit:
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
         self.state: Any = None
+        self.remark = ""  # what the host's log should say of the last step that was done
+        self._most = parameters.max_substeps
         self._memo: dict[str, Array] = {}
         self._memo_of: Any = None
 
@@ -48,7 +52,7 @@ class PipeUnit:
             "top_angular_velocity": (3, "rad/s", "angular velocity of the top, mean over the step, in e"),
             "top_position": (3, "m", "position of the top, in e"),
             "top_quaternion": (4, "1", "attitude of the top section, scalar first"),
-            "impedance": (36, "N.s/m", "d(force, moment on the pipe) / d(velocity, angular velocity), row by row; SI"),
+            "impedance": (36, "N.s/m", "d(force, moment on the pipe) / d(velocity, angular velocity), row by row; of the last sub-step"),
             "kinetic_energy": (1, "J", "kinetic energy"),
             "elastic_energy": (1, "J", "strain energy"),
             "gravity_energy": (1, "J", "potential energy of the submerged weight, zero at the bed"),
@@ -87,14 +91,22 @@ class PipeUnit:
         return None
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
-        """Advance by h [s]; a message, and the state unchanged, if Newton's method does not converge."""
-        motion = inputs["velocity"], inputs["angular_velocity"]
-        result = self._pipe.step(self.state[0]._replace(time=time), *motion, h, np.reshape(inputs["mobility"], (6, 6)))
+        """Advance by h [s]; a message, and the state unchanged, if Newton's method does not converge, nor in sub-steps if allowed.
+
+        A top that yields gets no sub-steps: each part would have a velocity of its own, and the work would not be that of the means.
+        """
+        start, mobility = self.state[0]._replace(time=time), np.reshape(inputs["mobility"], (6, 6))
+        most = 1 if mobility.any() else self._most
+        step = partial(self._pipe.step, mobility=mobility)
+        result, parts = substeps.divide(step, start, inputs["velocity"], inputs["angular_velocity"], h, most)
+        what = f"step of {h:g} s at t = {time:g} s"
         if not result.converged:
-            return (
-                f"step of {h:g} s at t = {time:g} s: no convergence after {result.iterations} corrections, "
-                f"residual {result.residual:.2e} of the largest section force"
-            )
+            nor = f"nor in sub-steps of {h / most:g} s, " if most > 1 else ""
+            corrections = f"no convergence after {result.iterations} corrections"
+            return f"{what}: {corrections}, {nor}residual {result.residual:.2e} of the largest section force"
+        self.remark = ""
+        if len(parts) > 1:
+            self.remark = f"{what}: done in {len(parts)} sub-steps of {min(parts):g} s or more, {result.iterations} corrections"
         self.state = (result.state, result.top, result.impedance, result.iterations, result.residual)
         return None
 

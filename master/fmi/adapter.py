@@ -1,7 +1,8 @@
 """A unit as an FMI 2.0 co-simulation slave: ports, parameters, state and errors; no physics.
 
 Travels inside every exported FMU (relative imports only) and drives any class of the unit protocol: PARAMETERS,
-INPUTS, outputs(), initialize(), step(), output(), state. Answers to the host (see `failure`):
+INPUTS, outputs(), initialize(), step(), output(), state, and where there is one `remark`, what the log should say of a
+step that was done. Answers to the host (see `failure`):
   - a step that does not converge, meets a number that is not finite, or is asked for out of order: logged, discard,
     the unit stands where it stood before;
   - a refused parameter or initialisation, and a bug: fmi2Error with the message (fmi2Fatal under PythonFMU's own library), the process
@@ -103,6 +104,8 @@ class UnitSlave(Fmi2Slave):
         message = self._step(current_time, step_size)
         if message is not None:
             self.log(printable(message), Fmi2Status.discard)
+        elif remark := getattr(self.unit, "remark", ""):
+            self.log(printable(remark), Fmi2Status.warning)
         return message is None
 
     def _step(self, time: float, step: float) -> str | None:
