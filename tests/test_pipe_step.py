@@ -60,7 +60,7 @@ def sway(t):
 def test_energy_identity_and_dissipations_at_any_step(name):
     """Energy created per step <= 1e-10 of summed absolute works and changes + 1e-14 of energies; no dissipation negative."""
     pipe, _, start = started(scene(name))
-    for h, count in ((1e-3, 10), (0.05, 20), (0.2, 20), (1.0, 12), (2.0, 8)):
+    for h, count in ((1e-3, 10), (0.01, 10), (0.1, 20), (0.5, 16), (1.0, 12), (2.0, 8)):
         states, _ = march(pipe, start, sway, h, count)
         for old, new in pairwise(states):
             created, allowed = balance(pipe, old, new)
@@ -139,18 +139,18 @@ def momenta(line, state):
 
 
 def test_a_free_line_keeps_its_linear_momentum_exactly_and_its_angular_momentum_to_second_order():
+    """A step is symmetric in time: whatever is not kept errs by an even power of it, here the second. Linear momentum: to round-off."""
     line, start = tumbling()
     linear, angular = momenta(line, start)
     errors = []
-    for h in (0.02, 0.01):
+    for h in (0.04, 0.02, 0.01):
         state = start
         for _ in range(round(0.4 / h)):
             state = free_step(line, state, h)
         p, spin = momenta(line, state)
         np.testing.assert_allclose(p, linear, rtol=1e-13)
         errors.append(np.linalg.norm(spin - angular) / np.linalg.norm(angular))
-    assert errors[0] < 1e-5
-    assert math.log2(errors[0] / errors[1]) > 1.7
+    assert math.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.3)
 
 
 @pytest.mark.parametrize("angle", [0.1, 0.5])

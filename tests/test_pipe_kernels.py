@@ -1,0 +1,76 @@
+"""Kernels on their own, against numpy and by hand: elimination, the pinned foot, what recovery takes off a moving line."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pipe_helpers import P16, bar, started, straight
+
+from pipe_fmu import PipeParameters, block_tridiagonal, newton, recovery
+from pipe_fmu.environment import Environment
+from pipe_fmu.line import Water
+
+
+def test_elimination_exchanges_rows_where_a_pivot_would_vanish():
+    """A zero, and a number at round-off, on the diagonal: the solution is numpy's to 1e-12."""
+    a = np.array([[1e-18, 2.0, 1.0], [3.0, 0.0, -1.0], [0.5, 1.0, 1.0]])
+    sides = np.array([[1.0, 4.0], [2.0, -1.0], [3.0, 0.5]])
+    factors, pivots, many, one = a.copy(), np.empty(3, np.int64), sides.copy(), sides[:, 0].copy()
+    assert block_tridiagonal.lu(factors, pivots)
+    block_tridiagonal.lu_solve(factors, pivots, many)
+    block_tridiagonal.lu_solve_vector(factors, pivots, one)
+    np.testing.assert_allclose(many, np.linalg.solve(a, sides), rtol=1e-12)
+    np.testing.assert_allclose(one, many[:, 0], rtol=1e-12)
+
+
+def test_elimination_tells_a_singular_block():
+    a = np.array([[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
+    assert not block_tridiagonal.lu(a, np.empty(3, np.int64))
+
+
+@pytest.mark.parametrize("clamped", [True, False])
+def test_tangent_of_the_held_foot_is_the_derivative_of_its_residual(clamped):
+    """On a linear residual, where the foot is free to turn: rows of (held tangent) x = held residual."""
+    _, line = bar(10.0, 3, axial=1e5, shear=1e5, torsion=80.0, bending=100.0, foot_clamped=clamped)
+    random = np.random.default_rng(3)
+    quaternion = np.tile(np.array([0.8, 0.2, -0.4, 0.4]), (3, 1))
+    diagonal, upper, x = random.normal(size=(3, 6, 6)), random.normal(size=(2, 6, 6)), random.normal(size=(3, 6))
+    residual = np.zeros((3, 6))
+    residual[0] = diagonal[0] @ x[0] + upper[0] @ x[1]
+    newton.hold_foot(line, quaternion, diagonal, upper)
+    newton.hold_foot_residual(line, quaternion, tuple(x[0, 3:]), residual)
+    held = 6 if clamped else 3
+    np.testing.assert_allclose((diagonal[0] @ x[0] + upper[0] @ x[1])[held:], residual[0, held:], rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(diagonal[0, :held], np.eye(6)[:held])
+    assert not residual[0, :held].any()
+
+
+def test_recovery_takes_off_the_drag_of_the_velocities_at_the_ends():
+    """The upper of two elements swept about its lower end, c v |v| per length: shares c V^2 h / 12 and / 4 of its ends, by hand."""
+    s, line = bar(12.0, 3, axial=1e8, shear=1e8, torsion=1e6, bending=1e6)
+    line = line._replace(drag=np.full((2, 2), 50.0))
+    velocity = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    water = Water(np.zeros(0), np.zeros((0, 3)), True)
+    found = recovery.nodal_wrenches(line, water, *straight(s), velocity, np.zeros((2, 7)))
+    share = 50.0 * 2.0**2 * 6.0
+    np.testing.assert_allclose(found[:, 1], [0.0, -0.5 * share / 12.0, share / 4.0], rtol=1e-12)
+
+
+def test_above_the_surface_there_is_no_pressure():
+    """The wall carries the effective tension there, and less the pressure's -p_e A_e below."""
+    pipe, _, state = started(PipeParameters(section=P16, nodes=8, environment=Environment(depth=700.0)))
+    forces = pipe.section_forces(state)
+    pressed = pipe.wall_tension(state, forces) - forces.tension
+    dry = state.position[:, 2] < -700.0
+    assert 0 < dry.sum() < 8
+    assert not pressed[dry].any()
+    depth = 700.0 + state.position[~dry, 2]
+    np.testing.assert_allclose(pressed[~dry], -1025.0 * 9.81 * depth * 0.25 * np.pi * 0.4064**2, rtol=1e-12)
+
+
+def test_the_wall_at_a_node_is_that_of_the_section_below_it():
+    sections = (replace(P16, length=500.0), replace(P16, length=700.0, wall_thickness=0.0254))
+    parameters = PipeParameters(sections=sections)
+    wall = recovery.wall(parameters, np.array([0.0, 250.0, 500.0, 501.0, 1200.0]))
+    thin, thick = (section.steel_area for section in sections)
+    np.testing.assert_allclose(wall.area, [thin, thin, thin, thick, thick], rtol=1e-12)
