@@ -120,6 +120,23 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
 
 
 @inner
+def bed_on_sag(h, dt, diameter, weight, damping, old, new):
+    """Part of the bed's reaction over a step that bears on the sag [N]: for the tangent, as it goes with the sag's second derivative.
+
+    Arguments as in `add_mean_contact`; with `old` = `new` the static reaction.
+    """
+    total = 0.0
+    for k in range(4):
+        x = BED_POINTS[k]
+        y = 1.0 - x
+        z_old = y * old[0] + x * old[1] + x * y * old[2]
+        z_new = y * new[0] + x * new[1] + x * y * new[2]
+        force, _ = mean_contact(z_old, z_new, diameter, weight)
+        total += h * BED_WEIGHTS[k] * x * y * force * max(0.0, 1.0 + damping * (z_new - z_old) / dt)
+    return total
+
+
+@inner
 def add_contact(h, diameter, weight, z1, z2, sag, sag_row, vector, matrix, scratch):
     """Static reaction of the bed on one element; `sag_row` (9,) gradient of the sag; `scratch` (2, 3, 12). Returns its potential [J]."""
     potential = 0.0

@@ -5,7 +5,7 @@ import numpy as np
 from .assembly import add_matrix, add_outer, add_vector, clear, expand, expand_matrix
 from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, strains
-from .loads import add_contact, add_drag
+from .loads import add_contact, add_drag, bed_on_sag
 
 
 @inner
@@ -40,7 +40,7 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
     vector = np.empty(12)
     matrix = np.empty((12, 12))
     still = np.zeros((2, 6))
-    depths = np.empty(2)
+    depths = np.empty(3)  # z of the nodes, and the sag
     scratch = np.empty((2, 3, 12))
     elastic, gravity, pressed = 0.0, 0.0, 0.0
     for e in range(line.length.shape[0]):
@@ -58,6 +58,9 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
         for k in range(ROWS):
             for i in range(9):
                 nine[i] += stress[k] * rows[k, i]
+        depths[0], depths[1], depths[2] = position[e, 2], position[e + 1, 2], strain[STRAINS]
+        if line.bed.shape[0] > 0:
+            stress[STRAINS] += bed_on_sag(h, 1.0, line.diameter[e], line.weight[e], 0.0, depths, depths)
         geometric_stiffness(rm, u, psi, h, line.share[e], stress, square)
         for k in range(STRAINS):
             add_outer(square, h * line.stiffness[e, k], rows[k], rows[k])
@@ -65,7 +68,6 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
         expand_matrix(square, matrix)
         vector[2] -= 0.5 * weight
         vector[8] -= 0.5 * weight
-        depths[0], depths[1] = position[e, 2], position[e + 1, 2]
         if water.drag and water.levels.shape[0] > 0:
             add_drag(rm, u, psi, h, line.drag[e], still, depths, water.levels, water.velocities, 0.0, True, vector, matrix, scratch)
         if line.bed.shape[0] > 0:

@@ -23,7 +23,7 @@ import numpy as np
 from .assembly import add_matrix, add_outer, add_vector, clear, expand, expand_matrix
 from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, resultant, strains
-from .loads import add_drag, add_mean_contact
+from .loads import add_drag, add_mean_contact, bed_on_sag
 from .node_kernel import CONTACT, CURRENT, DRAG, INTERNAL, NUMERICAL, add_node, turn_columns, vector_of
 from .so3 import (
     add,
@@ -129,6 +129,11 @@ def _assemble(line, water, h, old, x, new_strain, fresh, sharp, system, works, t
             for k in range(ROWS):
                 for i in range(9):
                     nine[i] += stress[k] * mean[k, i]
+        if line.bed.shape[0] > 0:
+            old_z[0], old_z[1], old_z[2] = position[e, 2], position[e + 1, 2], strain[e, STRAINS]
+            new_z[0], new_z[1], new_z[2] = old_z[0] + x[e, 2], old_z[1] + x[e + 1, 2], new_strain[e, STRAINS]
+            if fresh:
+                stress[STRAINS] += bed_on_sag(length, h, line.diameter[e], line.weight[e], line.bed[0], old_z, new_z)
         if fresh:
             geometric_stiffness(middle, u_mid, psi_mid, length, share, stress, square)
             for i in range(9):
@@ -157,8 +162,6 @@ def _assemble(line, water, h, old, x, new_strain, fresh, sharp, system, works, t
             works[DRAG] += h * dissipated
             works[CURRENT] += h * supplied
         if line.bed.shape[0] > 0:
-            old_z[0], old_z[1], old_z[2] = position[e, 2], position[e + 1, 2], strain[e, STRAINS]
-            new_z[0], new_z[1], new_z[2] = old_z[0] + x[e, 2], old_z[1] + x[e + 1, 2], new_strain[e, STRAINS]
             works[CONTACT] += add_mean_contact(
                 length,
                 h,

@@ -7,7 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference_bvp as reference
-from pipe_helpers import HANGING, P16, PEER, SECTIONS, TANGENT, TANGENT_ATTITUDE, pitch, rotation, sea, started
+from pipe_helpers import (
+    HANGING,
+    P16,
+    PEER,
+    SECTIONS,
+    TANGENT,
+    TANGENT_ATTITUDE,
+    pitch,
+    rotation,
+    sea,
+    started,
+    static_system,
+    turned,
+)
 from scipy.optimize import fsolve
 
 from pipe_fmu import PipeParameters, Seabed
@@ -305,3 +318,23 @@ def test_line_lying_on_the_bed_with_its_top_on_it_is_carried_by_the_bed():
     pipe, found, _ = started(PipeParameters(top="pinned", top_quaternion=HANGING, top_position=(1199.99, 0.0, 0.0), seabed=Seabed()))
     assert abs(found.top[2]) < 1e-9 * (pipe.line.weight @ pipe.line.length)
     assert abs(found.position[:, 2]).max() < 1e-9
+
+
+def test_tangent_on_the_bed_is_the_derivative_of_the_residual_and_long_lying_elements_are_stable():
+    """Elements up to 160 m lie on the bed: their weight and its reaction bear on their arcs, second derivatives included.
+
+    A lying line under tension resists sideways motion (a planar line that rests is stable if no other mode is soft).
+    """
+    pipe, found, state = line("P12", 0.6 * math.sqrt(LENGTH**2 - HEIGHT**2), None, foot="pinned", seabed=Seabed())
+    assert found.stable
+    n = len(pipe.s)
+    assert pipe.line.length.max() > 100.0
+    random = 1e-3 * np.random.default_rng(4).normal(size=(n, 6))
+    pose = turned(state.position, state.quaternion, random)
+    tangent = static_system(pipe.line, *pose)[1]
+    for k in (9, 11, 14, 16):  # second and third node: roll, turn sideways; up, pitch
+        x = np.zeros(6 * n)
+        x[k] = 1e-6
+        up, down = (static_system(pipe.line, *turned(*pose, sign * x.reshape(n, 6)))[0] for sign in (1, -1))
+        slope = (up - down) / 2e-6
+        np.testing.assert_allclose(tangent[:, k], slope, atol=1e-5 * np.abs(slope).max())
