@@ -29,11 +29,11 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
     at = statics.released(scene, rest)
     simulation = scene.sections.simulation
     experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
-    units = {"pipe": (pipe_fmu, "slave.PipeUnit", at.pipe)}
+    units: dict[str, tuple[Any, str, Any]] = {"pipe": (pipe_fmu, "slave.PipeUnit", at.pipe)}
     if at.vessel is not None:
         units["vessel"] = (vessel_fmu, "slave.VesselUnit", at.vessel)
     recipes = {
-        name: Recipe(Path(str(package.__file__)).parent, unit, to_mapping(parameters), experiment=experiment, portable=portable)
+        name: Recipe(Path(package.__file__).parent, unit, to_mapping(parameters), experiment=experiment, portable=portable)
         for name, (package, unit, parameters) in units.items()
     }
     fmus = {

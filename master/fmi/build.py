@@ -29,7 +29,7 @@ from xml.etree import ElementTree
 from pythonfmu import FmuBuilder
 
 from ..errors import RunError
-from . import loader, portable
+from . import licenses, loader, portable
 from .document import icon_png, port_table_html
 from .portable import EPOCH
 
@@ -174,6 +174,7 @@ def _finish(recipe: Recipe, raw: Path, finished: Path) -> None:
     for name in (name for name in contents if name.startswith(LINUX)):  # Windows keeps PythonFMU's
         contents[name] = loader.library(cache_folder("loaders"))
     contents["resources/runtime.py"] = (HERE / "runtime.py").read_bytes()
+    contents |= licenses.of_package("pipelay") | licenses.of_package("pythonfmu")
     contents["resources/python.txt"] = sys.executable.encode()
     if recipe.portable:
         contents |= _kernels(recipe, contents)
@@ -190,7 +191,8 @@ def _kernels(recipe: Recipe, contents: Mapping[str, bytes]) -> dict[str, bytes]:
             place = Path(folder, name)
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(content)
-        compiled = portable.kernels(Path(folder, "resources"), cache_folder("units") / recipe.bundle, recipe.experiment.get("step_size", 0.01))
+        step = recipe.experiment.get("step_size", 0.01)
+        compiled = portable.kernels(Path(folder, "resources"), cache_folder("units") / recipe.bundle, step)
     return {f"resources/{recipe.bundle}/__pycache__/{name}": content for name, content in compiled.items()}
 
 

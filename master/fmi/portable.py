@@ -27,19 +27,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import RunError
+from . import licenses
 
 HOME = "resources/python/linux64"
-LICENSES = "documentation/licenses"
 PACKAGES = ("numpy", "llvmlite", "numba")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date a zip archive can hold: equal contents, equal bytes
-# what numba is told to compile for, and the flags of /proc/cpuinfo that this needs
-PROCESSOR = b"x86-64-v3 cx16 lahf_lm popcnt sse4_1 sse4_2 ssse3 avx avx2 bmi1 bmi2 f16c fma abm movbe xsave"
+PROCESSOR = b"x86-64-v3 cx16 sahf popcnt sse4.1 sse4.2 ssse3 avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"  # LLVM's names: kind, features
 _GLIBC = re.compile(r"(ld-linux-x86-64|lib(c|m|dl|rt|pthread|util|resolv|anl|mvec))\.so")
-_LICENSE = re.compile("licen[cs]e|copying|notice", re.IGNORECASE)
 _NOT_NEEDED = (  # of the standard library: what develops and tests, what draws, and extension modules with libraries of their own
-    "test", "tests", "idle_test", "idlelib", "lib2to3", "tkinter", "turtledemo", "turtle.py", "ensurepip", "venv", "distutils", "pydoc_data",
-    "config-*", "site-packages", "dist-packages", "__pycache__", "_ssl.*", "_hashlib.*", "_sqlite3.*", "_tkinter.*", "_curses*", "readline.*",
-    "_dbm.*", "_gdbm.*", "nis.*", "_crypt.*", "_bz2.*", "_lzma.*", "_uuid.*", "_test*", "_xxtest*", "xxlimited*", "sitecustomize.py",
+    "test", "tests", "idle_test", "idlelib", "lib2to3", "tkinter", "turtledemo", "turtle.py", "ensurepip", "venv", "distutils",
+    "pydoc_data", "config-*", "site-packages", "dist-packages", "__pycache__", "_ssl.*", "_hashlib.*", "_sqlite3.*", "_tkinter.*", "_curses*",
+    "readline.*", "_dbm.*", "_gdbm.*", "nis.*", "_crypt.*", "_bz2.*", "_lzma.*", "_uuid.*", "_test*", "_xxtest*", "xxlimited*", "sitecustomize.py",
     # of the packages
     "f2py", "cuda", "tbbpool.*", "omppool.*", "_pyinstaller", "include", "*.pyi", "*.pxd", "*.h", "*.c", "*.cpp", "*.a",
 )  # fmt: skip
@@ -80,20 +78,23 @@ def _collect(tree: Path) -> None:
     unneeded = shutil.ignore_patterns(*_NOT_NEEDED)
     standard = Path(os.__file__).parent
     shutil.copytree(standard, library, ignore=unneeded)
-    _add_license("python", next(standard.glob("LICENSE*"), None) or _license_of(Path(os.__file__)), tree)
+    own = {f"{licenses.FOLDER}/python/{path.name}": path.read_bytes() for path in standard.glob("LICENSE*")}
+    texts = own or licenses.of_system("python", Path(os.__file__))
     for name in PACKAGES:
         package = Path(str(importlib.metadata.distribution(name).locate_file(name)))
         shutil.copytree(package, library / name, ignore=unneeded)
         if (shared := package.with_name(f"{name}.libs")).is_dir():
             shutil.copytree(shared, library / shared.name)
-        for file in importlib.metadata.files(name) or ():
-            if _LICENSE.match(file.name):
-                _add_license(name, Path(str(file.locate())), tree, str(file).replace("/", "_"))
+        texts |= licenses.of_package(name)
     (home / "bin").mkdir()
     shutil.copy(Path(sys.executable).resolve(), home / "bin" / "python3")
     for library_name, path in _foreign_libraries(home):
         shutil.copy(path, home / "lib" / library_name)
-        _add_license(library_name, _license_of(path), tree)
+        texts |= licenses.of_system(library_name, path)
+    for name, text in texts.items():
+        place = tree / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(text)
     compileall.compile_dir(library, quiet=2, invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH)
 
 
@@ -106,23 +107,6 @@ def _foreign_libraries(home: Path) -> Iterator[tuple[str, Path]]:
             raise RunError(f"--portable: the library {name} cannot be found")
         if not _GLIBC.match(name) and not path.startswith(str(home)):
             yield name, Path(path)
-
-
-def _license_of(file: Path) -> Path | None:
-    """The licence of a file of the system, by its package (Debian and its kin)."""
-    if not shutil.which("dpkg-query"):
-        return None
-    names = {str(file), str(file.resolve())}  # /lib or /usr/lib
-    owner = subprocess.run(["dpkg-query", "-S", *names], capture_output=True, text=True).stdout.partition(":")[0]
-    text = Path("/usr/share/doc", owner, "copyright")
-    return text if owner and text.is_file() else None
-
-
-def _add_license(name: str, file: Path | None, tree: Path, as_name: str = "") -> None:
-    folder = tree / LICENSES / name
-    folder.mkdir(parents=True, exist_ok=True)
-    if file is not None:
-        shutil.copy(file, folder / (as_name or file.name))
 
 
 def _pack(tree: Path, packed: Path) -> None:

@@ -10,15 +10,16 @@ import sys
 
 
 def choose_processor(resources):  # type: ignore[no-untyped-def]
-    """Have numba compile for the kind of processor that the FMU brings compiled kernels for, if this one is of the kind (Linux)."""
-    try:
-        with open(os.path.join(resources, _slave_module(resources).removesuffix("_entry"), "processor.txt"), encoding="ascii") as file:
-            kind, *needed = file.read().split()
-        with open("/proc/cpuinfo", encoding="ascii") as file:
-            flags = next(line for line in file if line.startswith("flags")).split()
-    except (OSError, StopIteration):
+    """Have numba compile for the kind of processor that the FMU brings compiled kernels for, if this one is of the kind."""
+    path = os.path.join(resources, _slave_module(resources).removesuffix("_entry"), "processor.txt")
+    if not os.path.exists(path):
         return
-    if set(needed) <= set(flags):
+    from llvmlite import binding  # not numba yet, which reads the environment when it is imported
+
+    with open(path, encoding="ascii") as file:
+        kind, *needed = file.read().split()
+    features = binding.get_host_cpu_features()
+    if all(features.get(feature) for feature in needed):
         os.environ.update(NUMBA_CPU_NAME=kind, NUMBA_CPU_FEATURES="")
 
 
