@@ -34,10 +34,12 @@ PACKAGES = ("numpy", "llvmlite", "numba")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date a zip archive can hold: equal contents, equal bytes
 PROCESSOR = b"x86-64-v3 cx16 sahf popcnt sse4.1 sse4.2 ssse3 avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"  # LLVM's names: kind, features
 _GLIBC = re.compile(r"(ld-linux-x86-64|lib(c|m|dl|rt|pthread|util|resolv|anl|mvec))\.so")
-_NOT_NEEDED = (  # of the standard library: what develops and tests, what draws, and extension modules with libraries of their own
+_NOT_NEEDED = (
+    # of the standard library: what develops, tests and draws, and extension modules that have libraries of their own
     "test", "tests", "idle_test", "idlelib", "lib2to3", "tkinter", "turtledemo", "turtle.py", "ensurepip", "venv", "distutils",
-    "pydoc_data", "config-*", "site-packages", "dist-packages", "__pycache__", "_ssl.*", "_hashlib.*", "_sqlite3.*", "_tkinter.*", "_curses*",
-    "readline.*", "_dbm.*", "_gdbm.*", "nis.*", "_crypt.*", "_bz2.*", "_lzma.*", "_uuid.*", "_test*", "_xxtest*", "xxlimited*", "sitecustomize.py",
+    "pydoc_data", "config-*", "site-packages", "dist-packages", "__pycache__", "sitecustomize.py", "_ssl.*", "_hashlib.*", "_sqlite3.*",
+    "_tkinter.*", "_curses*", "readline.*", "_dbm.*", "_gdbm.*", "nis.*", "_crypt.*", "_bz2.*", "_lzma.*", "_uuid.*", "_test*", "_xxtest*",
+    "xxlimited*",
     # of the packages
     "f2py", "cuda", "tbbpool.*", "omppool.*", "_pyinstaller", "include", "*.pyi", "*.pxd", "*.h", "*.c", "*.cpp", "*.a",
 )  # fmt: skip
