@@ -17,7 +17,7 @@ import pipe_fmu
 import vessel_fmu
 from master import statics
 from master.errors import RunError, UsageError
-from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
+from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu, compile_kernels
 from master.fmi.schema import to_mapping
 from master.scene import from_mapping
 
@@ -40,6 +40,8 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
         name: cached_fmu(recipe, cache_folder("fmus")) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
         for name, recipe in recipes.items()
     }
+    for name, path in fmus.items():
+        compile_kernels(recipes[name], path)
     equilibrium: dict[str, Any] = {"top_force_e_N": rest.found.top[:3].tolist(), "top_moment_e_N_m": rest.found.top[3:].tolist()}
     if at.vessel is not None:
         equilibrium |= {"hold_force": at.vessel.hold_force, "vessel": asdict(at.vessel.start)}

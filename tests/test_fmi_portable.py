@@ -15,6 +15,7 @@ from fmpy.validation import validate_fmu
 
 from master.__main__ import main
 from master.fmi import licenses, portable
+from master.fmu import Fmu
 
 STEP, COUNT = 0.1, 5
 INPUTS = {
@@ -87,13 +88,10 @@ with Fmu(path) as fmu:
 
 
 def in_python(fmu: Path, unit: str) -> dict[str, np.ndarray]:
-    """Outputs after the steps of the C host, taken by FMPy in a process of its own.
-
-    The second of two: a process that compiles kernels links them otherwise than one that finds them, with other round-off.
-    """
+    """Outputs after the steps of the C host, taken by FMPy in a process of its own."""
     command = [sys.executable, "-c", PROGRAM, json.dumps([str(fmu), INPUTS[unit], OUTPUTS[unit], STEP, COUNT])]
-    _, last = (subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2))
-    return {name: np.array(value) for name, value in json.loads(last).items()}
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return {name: np.array(value) for name, value in json.loads(done.stdout).items()}
 
 
 def command(host: str, unit: str, folder: Path, seen_as: Path, expected: dict[str, np.ndarray]) -> list[str]:
@@ -138,6 +136,18 @@ def test_a_plain_fmu_says_there_that_its_python_is_gone(plain, bare):
     done = c_host.run([CHROOT, str(bare), *command("/host", "pipe", folder, Path("/plain"), {})])
     assert done.returncode == 1
     assert f"Python {sys.executable}: No such file or directory; set PIPELAY_PYTHON" in done.stderr
+
+
+def test_a_portable_fmu_leaves_no_process_behind(carrying):
+    def children() -> list[str]:
+        return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+
+    before = children()
+    with Fmu(carrying / "vessel.fmu") as one, Fmu(carrying / "vessel.fmu") as two:
+        one.initialize()
+        two.initialize()
+        assert len(children()) == len(before) + 2  # one a library; each instance has unpacked its own
+    assert children() == before
 
 
 def test_licences_travel_and_no_problems_are_found(carrying, bare):

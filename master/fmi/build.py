@@ -117,6 +117,17 @@ def cached_fmu(recipe: Recipe, folder: Path) -> Path:
     return path if path.is_file() else build_fmu(recipe, path)
 
 
+def compile_kernels(recipe: Recipe, fmu: Path) -> None:
+    """Have numba compile the kernels of this recipe's `fmu`, unless some were compiled before, so that a process that runs it loads them.
+
+    A process that compiles kernels binds them otherwise than one that loads them, with other round-off: the first run would
+    differ from the later ones in the last bits. Raises RunError if the FMU does not start.
+    """
+    if not any((cache_folder("units") / recipe.bundle).glob("__pycache__/*.nbi")):
+        with zipfile.ZipFile(fmu) as archive:
+            _kernels(recipe, {name: archive.read(name) for name in archive.namelist() if name.startswith("resources/")})
+
+
 def bundled_package(fmu: Path) -> ModuleType:
     """The unit package inside an FMU file, imported from where the FMU itself imports it.
 

@@ -69,7 +69,7 @@ def kernels(resources: Path, unit: Path, step: float) -> dict[str, bytes]:
     command = [sys.executable, "-I", "-B", str(Path(__file__).with_name("warm.py")), str(resources), str(step)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
-        raise RunError(f"--portable: the FMU does not start: {' '.join(done.stderr.split())[-1000:]}")
+        raise RunError(f"the FMU does not start: {' '.join(done.stderr.split())[-1000:]}")
     return {path.name: path.read_bytes() for path in sorted(unit.glob("__pycache__/*.nb[ci]"))}
 
 
