@@ -65,6 +65,8 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--scene", default="paper", metavar="SCENE", help="scene the FMUs belong to (default: paper)")
     _set_argument(export)
     export.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path(), help="folder (default: here)")
+    portable = "put Python and compiled kernels into the FMUs, for machines without them (Linux x86-64; 100 MB each)"
+    export.add_argument("--portable", action="store_true", help=portable)
 
     command(
         "scenes", commands.scenes, "List the built-in scenes.", "Their files are in the package's folder master/scenes."

@@ -1,7 +1,7 @@
 """The process that prepares a run: checks the scene's units, finds the equilibrium, writes the FMUs.
 
-Reads the scene as JSON from standard input; `--export DIR` writes pipe.fmu and vessel.fmu there, else they go to a cache by content. Prints
-one JSON object: fmus, parameters, equilibrium; or error and exit.
+Reads the scene as JSON from standard input; `--export DIR` writes pipe.fmu and vessel.fmu there, with `--portable` ones that bring their
+Python, else they go to a cache by content. Prints one JSON object: fmus, parameters, equilibrium; or error and exit.
 """
 
 from __future__ import annotations
@@ -17,26 +17,31 @@ import pipe_fmu
 import vessel_fmu
 from master import statics
 from master.errors import RunError, UsageError
-from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
+from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu, compile_kernels
 from master.fmi.schema import to_mapping
 from master.scene import from_mapping
 
 
-def prepare(mapping: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False) -> dict[str, Any]:
     """FMU files, parameters to set and the equilibrium of a scene. Raises UsageError, RunError."""
     scene = from_mapping(mapping, "scene")
     rest = statics.equilibrium(scene)
     at = statics.released(scene, rest)
     simulation = scene.sections.simulation
     experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
-    recipes = {"pipe": Recipe(Path(pipe_fmu.__file__).parent, "slave.PipeUnit", to_mapping(at.pipe), experiment=experiment)}
+    units: dict[str, tuple[Any, str, Any]] = {"pipe": (pipe_fmu, "slave.PipeUnit", at.pipe)}
     if at.vessel is not None:
-        package = Path(vessel_fmu.__file__).parent
-        recipes["vessel"] = Recipe(package, "slave.VesselUnit", to_mapping(at.vessel), experiment=experiment)
+        units["vessel"] = (vessel_fmu, "slave.VesselUnit", at.vessel)
+    recipes = {
+        name: Recipe(Path(package.__file__).parent, unit, to_mapping(parameters), experiment=experiment, portable=portable)
+        for name, (package, unit, parameters) in units.items()
+    }
     fmus = {
         name: cached_fmu(recipe, cache_folder("fmus")) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
         for name, recipe in recipes.items()
     }
+    for name, path in fmus.items():
+        compile_kernels(recipes[name], path)
     equilibrium: dict[str, Any] = {"top_force_e_N": rest.found.top[:3].tolist(), "top_moment_e_N_m": rest.found.top[3:].tolist()}
     if at.vessel is not None:
         equilibrium |= {"hold_force": at.vessel.hold_force, "vessel": asdict(at.vessel.start)}
@@ -51,7 +56,7 @@ def main(arguments: list[str]) -> None:
     """Entry point."""
     folder = Path(arguments[1]) if arguments[:1] == ["--export"] else None
     try:
-        answer = prepare(json.load(sys.stdin), folder)
+        answer = prepare(json.load(sys.stdin), folder, "--portable" in arguments[2:])
     except (UsageError, RunError) as error:
         answer = {"error": str(error), "exit": 2 if isinstance(error, UsageError) else 1}
     try:

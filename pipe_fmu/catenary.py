@@ -1,10 +1,10 @@
 """Inextensible catenary between two points, free or partly lying on the bed: the shape from which the statics start."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ def parameter(length: float, distance: float, height: float, on_bed: bool) -> tu
     chord = math.sqrt(max(length**2 - height**2, 0.0))
     distance = max(distance, 1e-6 * length)
     ratio = chord / distance
-    q = math.sqrt(6.0 * (ratio - 1.0)) if ratio < 1.0 + 1e-12 else brentq(lambda q: _sinhc(q) - ratio, 1e-7, 700.0)
+    q = math.sqrt(6.0 * (ratio - 1.0)) if ratio < 1.0 + 1e-12 else _root(lambda q: _sinhc(q) - ratio, 1e-7, 700.0)
     c = 0.5 * distance / max(q, 1e-7)
     lowest = 0.5 * distance - c * math.atanh(height / length)  # where the free line has its lowest point
     if not on_bed or lowest <= 1e-9 * length:
@@ -33,12 +33,22 @@ def parameter(length: float, distance: float, height: float, on_bed: bool) -> tu
     low = 1e-6 * height
     if excess(low) < 0.0:  # more than hangs straight down: the rest lies slack
         return low, length - height
-    c = brentq(excess, low, 1e6 * height)
+    c = _root(lambda c: -excess(c), low, 1e6 * height)
     return c, length - math.sqrt(height**2 + 2.0 * height * c)
 
 
 def _sinhc(q: float) -> float:
     return math.sinh(q) / q
+
+
+def _root(increasing: Callable[[float], float], low: float, high: float) -> float:
+    """Root of a function between `low` and `high`, to the last bit, by bisection.
+
+    The functions here cost a microsecond; scipy's solvers would cost every exported unit half a second at its start, and 140 MB.
+    """
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (low, middle) if increasing(middle) > 0.0 else (middle, high)
+    return middle
 
 
 def shape(s: Array, length: float, top: tuple[float, float, float], on_bed: bool) -> tuple[Array, Array]:

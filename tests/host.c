@@ -1,11 +1,12 @@
-/* The smallest host: host LIBRARY RESOURCES GUID STEP COUNT VR...
-   Instantiates, initialises, takes COUNT steps of STEP seconds, saves and restores a state, prints the reals VR. */
+/* The smallest host: host LIBRARY RESOURCES GUID STEP COUNT [VR=VALUE | VR]...
+   Instantiates, initialises, sets the reals VR=VALUE, takes COUNT steps of STEP seconds, each twice from a saved state, prints the reals VR. */
 #include <dlfcn.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+enum { MOST = 512 };
 typedef struct { void *logger, *allocate, *release, *finished, *environment; } Callbacks;
 
 static void note(void *environment, const char *name, int status, const char *category, const char *message, ...) {
@@ -34,12 +35,21 @@ int main(int count, char **words) {
     void *it = ((void *(*)(const char *, int, const char *, const char *, const Callbacks *, int, int))function("fmi2Instantiate"))(
         "unit", 1, words[3], words[2], &callbacks, 0, 0);
     if (!it) return fprintf(stderr, "not instantiated\n"), 1;
-    double step = atof(words[4]), time = 0.0, values[64];
-    unsigned references[64], n = 0;
-    for (int i = 6; i < count && n < 64; i++) references[n++] = (unsigned)atoi(words[i]);
+    double step = atof(words[4]), time = 0.0, values[MOST];
+    unsigned references[MOST], n = 0;
     CALL("fmi2SetupExperiment", (void *, int, double, double, int, double), it, 0, 0.0, 0.0, 0, 0.0);
     CALL("fmi2EnterInitializationMode", (void *), it);
     CALL("fmi2ExitInitializationMode", (void *), it);
+    for (int i = 6; i < count && n < MOST; i++) {
+        const char *equals = strchr(words[i], '=');
+        references[n] = (unsigned)atoi(words[i]);
+        if (equals) {
+            values[n] = atof(equals + 1);
+            CALL("fmi2SetReal", (void *, const unsigned *, size_t, const double *), it, &references[n], 1, &values[n]);
+        } else {
+            n++;
+        }
+    }
     for (int i = 0; i < atoi(words[5]); i++, time += step) {
         void *state = NULL;
         CALL("fmi2GetFMUstate", (void *, void **), it, &state);

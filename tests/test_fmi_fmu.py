@@ -338,23 +338,6 @@ def test_an_unwritable_cache_is_no_obstacle(files, tmp_path):
     assert str(tmp_path / "home" / ".cache" / "pipelay") in done.stdout
 
 
-def test_many_lives_of_an_instance_hold_memory(files):
-    def resident() -> int:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-
-    def live(count: int) -> None:
-        for _ in range(count):
-            with Fmu(files[0]) as fmu:
-                fmu.initialize()
-                fmu.step(0.0, 0.1)
-                fmu.snapshot()
-
-    live(20)
-    before = resident()
-    live(100)
-    assert resident() - before < 4e6  # bytes: 40 kB a life
-
-
 def test_building_and_running_in_one_process_leaves_the_import_path_alone(folder):
     before = list(sys.path)
     build_fmu(BODY, folder / "again.fmu")

@@ -1,39 +1,24 @@
 """The loader of an exported FMU in a host that is not Python, with an empty environment."""
 
-import shutil
-import subprocess
-import zipfile
 from pathlib import Path
-from xml.etree import ElementTree
 
+import c_host
 import pytest
 from units.toys import BODY, SPRING, spring_recipe
 
 from master.fmi.build import build_fmu
-from master.fmi.loader import compiler
 from master.fmu import Fmu
-
-SOURCE = Path(__file__).with_name("host.c")
 
 
 @pytest.fixture(scope="module")
 def host(tmp_path_factory):
-    made = tmp_path_factory.mktemp("host") / "host"
-    subprocess.run([*compiler(), "-o", str(made), str(SOURCE), "-ldl"], check=True)
-    return made
+    return c_host.compiled(tmp_path_factory.mktemp("host"))
 
 
-def run(host: Path, fmu: Path, names: list[str], **environment: str) -> subprocess.CompletedProcess[str]:
-    folder = fmu.with_suffix("")
-    shutil.rmtree(folder, ignore_errors=True)
-    zipfile.ZipFile(fmu).extractall(folder)
-    model = ElementTree.parse(folder / "modelDescription.xml").getroot()
-    references = {v.get("name"): v.get("valueReference") for v in model.iter("ScalarVariable")}
-    library = next((folder / "binaries" / "linux64").glob("*.so"))
-    uri = (folder / "resources").as_uri()
-    command = [host, library, uri, model.get("guid"), "0.1", "5", *(references[name] for name in names)]
+def run(host: Path, fmu: Path, names: list[str], **environment: str):
+    folder = c_host.unpacked(fmu, fmu.with_suffix(""))
     environment = {"PIPELAY_CACHE": str(fmu.parent / "cache")} | environment
-    return subprocess.run(list(map(str, command)), env=environment, capture_output=True, text=True, timeout=120)
+    return c_host.run(c_host.command(str(host), folder, folder, names, {}), **environment)
 
 
 @pytest.mark.parametrize("recipe", [spring_recipe(stiffness=7.0, offset=[1.0, 0.0, 0.0]), BODY], ids=["spring", "body"])

@@ -28,7 +28,7 @@ from pythonfmu.enums import Fmi2Status
 
 from . import schema
 from .description import fill
-from .failure import Refused, guarded, printable, release_at_exit, where
+from .failure import Refused, guarded, printable, where
 from .ports import Ports, Run
 
 CONFIGURATION = "configuration"
@@ -57,7 +57,6 @@ class UnitSlave(Fmi2Slave):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         about = json.loads(Path(self.resources, "fmu.json").read_text(encoding="utf-8"))
-        release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{about['about']['modelName']}.so")
         self.description = self.unit_class.DESCRIPTION
         for name, value in about["about"].items():  # modelName, guid, author, license, version, description
             setattr(self, name, value)

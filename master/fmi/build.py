@@ -29,14 +29,14 @@ from xml.etree import ElementTree
 from pythonfmu import FmuBuilder
 
 from ..errors import RunError
-from . import loader
+from . import licenses, loader, portable
 from .document import icon_png, port_table_html
+from .portable import EPOCH
 
 HERE = Path(__file__).parent
 BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py", "server.py")
 LINUX = "binaries/linux64/"
 CAPABILITIES = {"needsExecutionTool": False, "canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date a zip archive can hold: equal contents, equal bytes
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Recipe:
 
     `package` is the folder of the unit package, `unit` the place of its class in it (``slave.PipeUnit``), `parameters`
     the nested mapping that becomes the defaults. Without a `description` the unit's own is taken. `experiment` may hold
-    start_time, stop_time, step_size, tolerance.
+    start_time, stop_time, step_size, tolerance. A `portable` FMU brings its own Python and compiled kernels (see `portable`).
     """
 
     package: Path
@@ -55,6 +55,7 @@ class Recipe:
     author: str = "the pipelay authors"
     license: str = "MIT"
     experiment: Mapping[str, float] = field(default_factory=dict)
+    portable: bool = False
 
     @property
     def name(self) -> str:
@@ -76,7 +77,8 @@ class Recipe:
 def build_fmu(recipe: Recipe, destination: Path) -> Path:
     """Write the FMU to the file `destination`, whole or not at all.
 
-    Raises ValueError if the unit refuses its parameters or declares a unit of measure that is not understood.
+    Raises ValueError if the unit refuses its parameters or declares a unit of measure that is not understood, RunError without a
+    compiler, or where a portable one cannot be made.
     """
     destination.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="fmu_") as folder, _clean_imports():
@@ -92,7 +94,7 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
             target.write_bytes(text)
         raw = FmuBuilder.build_FMU(entry, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **CAPABILITIES)
         finished = destination.with_name(f".{os.getpid()}_{destination.name}")
-        _finish(Path(raw), finished, cache_folder("loaders"))
+        _finish(recipe, Path(raw), finished)
         finished.replace(destination)
     return destination
 
@@ -113,6 +115,17 @@ def cached_fmu(recipe: Recipe, folder: Path) -> Path:
     """The FMU of this recipe in `folder`, built if it is not there: ``folder/Pipe_<hash>.fmu``."""
     path = folder / f"{recipe.name}_{recipe.digest}.fmu"
     return path if path.is_file() else build_fmu(recipe, path)
+
+
+def compile_kernels(recipe: Recipe, fmu: Path) -> None:
+    """Have numba compile the kernels of this recipe's `fmu`, unless some were compiled before, so that a process that runs it loads them.
+
+    A process that compiles kernels binds them otherwise than one that loads them, with other round-off: the first run would
+    differ from the later ones in the last bits. Raises RunError if the FMU does not start.
+    """
+    if not any((cache_folder("units") / recipe.bundle).glob("__pycache__/*.nbi")):
+        with zipfile.ZipFile(fmu) as archive:
+            _kernels(recipe, {name: archive.read(name) for name in archive.namelist() if name.startswith("resources/")})
 
 
 def bundled_package(fmu: Path) -> ModuleType:
@@ -148,12 +161,12 @@ def _sources(recipe: Recipe) -> dict[str, bytes]:
     files["fmi_unit.py"] = f"from .fmi.adapter import UnitSlave\nfrom .{module} import {name} as Unit\n".encode()
     files["fmi/__init__.py"] = b""
     files.update({f"fmi/{source}": (HERE / source).read_bytes() for source in BUNDLED})
-    return files
+    return files | ({"processor.txt": portable.PROCESSOR} if recipe.portable else {})
 
 
 def _digest(parts: Mapping[str, str | bytes]) -> str:
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
-    for source in ("entry.py", "runtime.py", "loader.c"):
+    for source in ("entry.py", "runtime.py", "loader.c", "portable.py"):
         digest.update((HERE / source).read_bytes())
     digest.update(sys.executable.encode())
     for name, content in sorted(parts.items()):
@@ -162,19 +175,36 @@ def _digest(parts: Mapping[str, str | bytes]) -> str:
     return digest.hexdigest()[:12]
 
 
-def _finish(raw: Path, finished: Path, loaders: Path) -> None:
-    """Repack compressed, in fixed order and with fixed dates; add documentation, icon and loader."""
-    with zipfile.ZipFile(raw) as source, zipfile.ZipFile(finished, "w", zipfile.ZIP_DEFLATED) as target:
+def _finish(recipe: Recipe, raw: Path, finished: Path) -> None:
+    """Repack compressed, in fixed order and with fixed dates; add documentation, icon and loader, and to a portable FMU its Python."""
+    with zipfile.ZipFile(raw) as source:
         contents = {name: source.read(name) for name in source.namelist()}
-        model = ElementTree.fromstring(contents["modelDescription.xml"])
-        contents["documentation/index.html"] = port_table_html(model).encode()
-        contents["model.png"] = icon_png()
-        for name in (name for name in contents if name.startswith(LINUX)):  # Windows keeps PythonFMU's
-            contents[name] = loader.library(loaders)
-        contents["resources/runtime.py"] = (HERE / "runtime.py").read_bytes()
-        contents["resources/python.txt"] = sys.executable.encode()
+    model = ElementTree.fromstring(contents["modelDescription.xml"])
+    contents["documentation/index.html"] = port_table_html(model).encode()
+    contents["model.png"] = icon_png()
+    for name in (name for name in contents if name.startswith(LINUX)):  # Windows keeps PythonFMU's
+        contents[name] = loader.library(cache_folder("loaders"))
+    contents["resources/runtime.py"] = (HERE / "runtime.py").read_bytes()
+    contents |= licenses.of_package("pipelay") | licenses.of_package("pythonfmu")
+    contents["resources/python.txt"] = sys.executable.encode()
+    if recipe.portable:
+        contents |= _kernels(recipe, contents)
+        shutil.copy(portable.archive(cache_folder("runtimes")), finished)
+    with zipfile.ZipFile(finished, "a") as target:
         for name in sorted(contents):
-            target.writestr(zipfile.ZipInfo(name, _EPOCH), contents[name], zipfile.ZIP_DEFLATED)
+            target.writestr(zipfile.ZipInfo(name, EPOCH), contents[name], zipfile.ZIP_DEFLATED)
+
+
+def _kernels(recipe: Recipe, contents: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The compiled kernels of the unit by their places in the FMU of these `contents`."""
+    with tempfile.TemporaryDirectory(prefix="fmu_") as folder:
+        for name, content in contents.items():
+            place = Path(folder, name)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(content)
+        step = recipe.experiment.get("step_size", 0.01)
+        compiled = portable.kernels(Path(folder, "resources"), cache_folder("units") / recipe.bundle, step)
+    return {f"resources/{recipe.bundle}/__pycache__/{name}": content for name, content in compiled.items()}
 
 
 @contextlib.contextmanager

@@ -44,6 +44,8 @@ def settle(bundled: Path) -> Path:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=folder) as unfinished:
                 copy = shutil.copytree(bundled, Path(unfinished, bundled.name))
+                for source in copy.rglob("*.py"):  # older than any kernels that came along, which are then not taken for stale
+                    os.utime(source, (0, 0))
                 with contextlib.suppress(FileExistsError):  # another process was faster
                     copy.rename(place)
         except OSError:

@@ -4,20 +4,12 @@ PythonFMU knows three answers: OK, fmi2Discard (``do_step`` returns False) and, 
 every exception it also releases the class, the instance and the log list once too often, so that the second one kills
 the process. `Refused` is therefore raised through `refusal`, which takes those references beforehand; PythonFMU logs
 its repr. FMI messages are printf formats, so '%' is doubled.
-
-At the end of a process PythonFMU's library gives back its interpreter handle twice if it is still loaded then, and the
-process aborts. numba's libraries bind to it and keep it loaded, whatever the host closes; `release_at_exit` gives the
-handle back in time.
 """
 
 from __future__ import annotations
 
-import atexit
-import contextlib
 import ctypes
 import functools
-import os
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -69,20 +61,3 @@ def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
             raise refusal(slave, where(error)) from None
 
     return call
-
-
-def release_at_exit(library: Path) -> None:
-    """Have the PythonFMU `library` let go of the interpreter before a Python host exits (Linux)."""
-    if hasattr(os, "RTLD_NOLOAD") and str(library) not in _released:
-        _released.add(str(library))
-        atexit.register(_release, library)
-
-
-_released: set[str] = set()
-
-
-def _release(library: Path) -> None:
-    if threading.get_native_id() != os.getpid():  # PythonFMU itself runs the interpreter, in a thread of its own
-        return
-    with contextlib.suppress(OSError, AttributeError):  # it was unloaded after all
-        ctypes.CDLL(str(library), os.RTLD_NOLOAD | os.RTLD_NOW).finalizePythonInterpreter()

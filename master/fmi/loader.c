@@ -220,6 +220,9 @@ static int start_in_host(const char *resources) {
     void *globals = runpy ? py.method(runpy, "run_path", "s", path) : NULL, *load = globals ? py.item(globals, "load") : NULL;
     void *folder = load ? py.text(resources) : NULL, *handle = folder ? py.call(load, folder, NULL) : NULL;
     if (handle && py.callable(handle)) py.handle = handle;
+    void *held[] = {numpy, numba, runpy, globals, folder, py.handle ? NULL : handle};
+    for (size_t i = 0; i < sizeof held / sizeof *held; i++)
+        if (held[i]) py.forget(held[i]);
     py.clear();
     py.release(state);
     return py.handle != NULL;
@@ -320,7 +323,20 @@ FMI int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const categor
     return OK;
 }
 
+/* Ends an instance; the host's Python is let go of with the last one. */
 static void discard(Instance *it) {
+    pthread_mutex_lock(&lock);
+    Instance **place = &instances;
+    while (*place && *place != it) place = &(*place)->next;
+    if (*place) *place = it->next;
+    void *handle = instances ? NULL : py.handle;
+    if (handle) py.handle = NULL;
+    pthread_mutex_unlock(&lock);
+    if (handle && py.initialized()) {
+        int state = py.ensure();
+        py.forget(handle);
+        py.release(state);
+    }
     free(it->request.data);
     free(it->reply.data);
     free(it->name);
@@ -343,6 +359,8 @@ FMI void *fmi2Instantiate(const char *name, int type, const char *guid, const ch
         pthread_mutex_lock(&lock);
         status = start(it, resources);
         it->id = ++last_id;
+        it->next = instances;
+        instances = it;
         pthread_mutex_unlock(&lock);
     }
     if (status == OK) {
@@ -356,10 +374,6 @@ FMI void *fmi2Instantiate(const char *name, int type, const char *guid, const ch
         discard(it);
         return NULL;
     }
-    pthread_mutex_lock(&lock);
-    it->next = instances;
-    instances = it;
-    pthread_mutex_unlock(&lock);
     return it;
 }
 
@@ -368,11 +382,6 @@ FMI void fmi2FreeInstance(void *c) {
     if (!it) return;
     begin(it, FREE);
     ask(it, NULL, 0);
-    pthread_mutex_lock(&lock);
-    Instance **place = &instances;
-    while (*place != it) place = &(*place)->next;
-    *place = it->next;
-    pthread_mutex_unlock(&lock);
     discard(it);
 }
 

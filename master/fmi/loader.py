@@ -11,21 +11,23 @@ import sys
 import tempfile
 from pathlib import Path
 
+from ..errors import RunError
+
 SOURCE = Path(__file__).with_name("loader.c")
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-shared", "-s")
 
 
 def compiler() -> list[str]:
-    """ziglang's compiler (for glibc 2.17, so for every Linux in use), else the machine's own. Raises ValueError without either."""
+    """ziglang's compiler (for glibc 2.17, so for every Linux in use), else the machine's own. Raises RunError without either."""
     if importlib.util.find_spec("ziglang"):
         return [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-linux-gnu.2.17"]
     if found := shutil.which("cc"):
         return [found]
-    raise ValueError("no C compiler for the FMU's loader: pip install ziglang")
+    raise RunError("no C compiler for the FMU's loader: pip install ziglang")
 
 
 def library(folder: Path) -> bytes:
-    """The loader for Linux x86-64, kept in `folder`. Raises ValueError with the compiler's words where it fails."""
+    """The loader for Linux x86-64, kept in `folder`. Raises RunError with the compiler's words where it fails."""
     command = [*compiler(), *FLAGS]
     place = folder / f"loader_{hashlib.sha256(SOURCE.read_bytes() + repr(command).encode()).hexdigest()[:12]}.so"
     if not place.is_file():
@@ -37,6 +39,6 @@ def library(folder: Path) -> bytes:
                 [*command, "-o", str(made), str(SOURCE), "-ldl", "-lpthread"], env=os.environ | caches, capture_output=True, text=True
             )
             if done.returncode:
-                raise ValueError(f"the FMU's loader does not compile: {' '.join(done.stderr.split())[:1000]}")
+                raise RunError(f"the FMU's loader does not compile: {' '.join(done.stderr.split())[:1000]}")
             made.replace(place)
     return place.read_bytes()

@@ -9,18 +9,35 @@ import os
 import sys
 
 
+def choose_processor(resources):  # type: ignore[no-untyped-def]
+    """Have numba compile for the kind of processor that the FMU brings compiled kernels for, if this one is of the kind."""
+    path = os.path.join(resources, _slave_module(resources).removesuffix("_entry"), "processor.txt")
+    if not os.path.exists(path):
+        return
+    from llvmlite import binding  # not numba yet, which reads the environment when it is imported
+
+    with open(path, encoding="ascii") as file:
+        kind, *needed = file.read().split()
+    features = binding.get_host_cpu_features()
+    if all(features.get(feature) for feature in needed):
+        os.environ.update(NUMBA_CPU_NAME=kind, NUMBA_CPU_FEATURES="")
+
+
 def load(resources):  # type: ignore[no-untyped-def]
     """The function that answers requests, ``bytes -> bytes``. Raises ImportError with one line."""
     if sys.version_info < (3, 11):  # noqa: UP036  (any Python may be asked to run this)
         raise ImportError("Python 3.11 or later is needed, this is " + sys.version.split()[0])
-    with open(os.path.join(resources, "slavemodule.txt"), encoding="utf-8") as file:
-        name = file.read().strip()
     sys.path.insert(0, resources)
     try:
-        entry = importlib.import_module(name)
+        entry = importlib.import_module(_slave_module(resources))
     finally:
         sys.path.remove(resources)
     return importlib.import_module(entry.PACKAGE + ".fmi.server").Server(entry.Slave).answer
+
+
+def _slave_module(resources):  # type: ignore[no-untyped-def]
+    with open(os.path.join(resources, "slavemodule.txt"), encoding="utf-8") as file:
+        return file.read().strip()
 
 
 def serve(descriptor):  # type: ignore[no-untyped-def]
@@ -31,8 +48,10 @@ def serve(descriptor):  # type: ignore[no-untyped-def]
             answers.write(len(message).to_bytes(4, sys.byteorder) + message)
             answers.flush()
 
+        resources = os.path.dirname(os.path.abspath(__file__))
         try:
-            answer = load(os.path.dirname(os.path.abspath(__file__)))
+            choose_processor(resources)
+            answer = load(resources)
         except Exception as error:
             send(b"\1" + " ".join(str(error).split()).encode("utf-8", "replace") + b"\0")
             return

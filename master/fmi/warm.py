@@ -1,0 +1,20 @@
+"""Starts the unit of an unpacked FMU, so that numba compiles and keeps its kernels: ``warm.py RESOURCES STEP`` (s)."""
+
+import runpy
+import sys
+
+
+def main(resources: str, step: float) -> None:
+    """Through initialisation, one step, and a look at every output. Raises what goes wrong."""
+    runtime = runpy.run_path(f"{resources}/runtime.py")
+    runtime["choose_processor"](resources)
+    slave = runtime["load"](resources).__self__.slave_class(instance_name="warm", resources=resources, visible=False)
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    slave.do_step(0.0, step)
+    slave.get_real([i for i, variable in enumerate(slave.ports.variables()) if variable.causality == "output"])
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], float(sys.argv[2]))
