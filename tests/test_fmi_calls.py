@@ -6,22 +6,26 @@ import sys
 from pathlib import Path
 
 import pytest
-from units.toys import build_pair
+from units.toys import SPRING
+
+import pipe_fmu
+import vessel_fmu
+from master.fmi.build import Recipe, build_fmu
 
 PROGRAM = Path(__file__).parent / "fuzz_calls.py"
-SECONDS = 15.0  # for each of four seeds: a minute
+SECONDS = 15.0  # for each of four runs: a minute
+PIPE = Recipe(Path(pipe_fmu.__file__).parent, "slave.PipeUnit", {"nodes": 6})
+VESSEL = Recipe(Path(vessel_fmu.__file__).parent, "slave.VesselUnit", {})
 
 
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory):
-    return build_pair(tmp_path_factory.mktemp("fmus with spaces"))[0]
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_no_sequence_of_calls_ends_the_process_or_passes_for_good_where_it_is_not(fmu, tmp_path, seed):
-    environment = {**os.environ, "PIPELAY_CACHE": str(tmp_path), "TMPDIR": str(fmu.parent)}
+@pytest.mark.parametrize(("recipe", "seed"), [(SPRING, 0), (VESSEL, 1), (PIPE, 2), (PIPE, 3)], ids=["spring", "vessel", "pipe", "pipe-2"])
+def test_no_sequence_of_calls_ends_the_process_or_passes_for_good_where_it_is_not(recipe, seed, tmp_path):
+    fmu = build_fmu(recipe, tmp_path / "with spaces" / "unit.fmu")
     command = [sys.executable, str(PROGRAM), str(fmu), str(seed), str(SECONDS)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=10 * SECONDS)
+    environment = {**os.environ, "TMPDIR": str(fmu.parent)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300.0 + SECONDS)
     last = done.stderr[done.stderr.rfind("instantiate") :]
     assert done.returncode == 0, f"seed {seed}, exit code {done.returncode}, calls:\n{last}"
-    assert int(done.stdout) > 1000
+    calls, steps = map(int, done.stdout.split())
+    assert calls > 1000
+    assert steps > 100

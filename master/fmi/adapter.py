@@ -13,10 +13,11 @@ initialisation mode.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 from xml.etree.ElementTree import Element
@@ -29,7 +30,7 @@ from pythonfmu.enums import Fmi2Status
 from . import schema
 from .description import fill
 from .failure import Refused, guarded, printable, where
-from .ports import Ports, Run
+from .ports import KINDS, Ports, Run
 
 CONFIGURATION = "configuration"
 START = "start."  # before the name of a parameter that has the name of a port, whose start value it is
@@ -42,11 +43,20 @@ Reader = Callable[[], list[Any]]
 class Snapshot(NamedTuple):
     """Everything a rollback needs; the unit's state is an immutable value, so this is a handful of references."""
 
+    guid: str
     phase: str
     time: float
     inputs: bytes
     changed: dict[str, Any]
     unit: Any
+
+
+def _getter(kind: str) -> Callable[[UnitSlave, list[int]], list[Any]]:
+    return guarded(lambda slave, vrs: slave._get(kind, vrs))
+
+
+def _setter(kind: str) -> Callable[[UnitSlave, list[int], list[Any]], None]:
+    return guarded(lambda slave, vrs, values: slave._set(kind, vrs, values))
 
 
 class UnitSlave(Fmi2Slave):
@@ -71,9 +81,9 @@ class UnitSlave(Fmi2Slave):
         self.inputs = np.zeros(self.ports.n_inputs)
         self._run_of_inputs = list(range(self.ports.n_inputs))
         self.changed: dict[str, Any] = {}  # parameters set by the host; replaced, never mutated
-        self.phase, self.time = "instantiated", 0.0
+        self.phase, self.time = "not initialised", 0.0
         self.unit: Any = None
-        self._readers: dict[tuple[int, ...], list[Reader]] = {}
+        self._readers: dict[tuple[object, ...], list[Reader]] = {}
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """PythonFMU's frame, completed."""
@@ -85,18 +95,34 @@ class UnitSlave(Fmi2Slave):
 
     @guarded
     def setup_experiment(self, start_time: float, stop_time: float | None = None, tolerance: float | None = None) -> None:
+        self._expect("not initialised", "set-up of the experiment")
         if not math.isfinite(start_time):
             raise Refused(f"start time = {start_time}: must be finite")
         self.time = start_time
 
     @guarded
     def enter_initialization_mode(self) -> None:
-        self.phase = "initializing"
+        self._expect("not initialised", "initialisation mode")
+        self.phase = "initialising"
 
     @guarded
     def exit_initialization_mode(self) -> None:
-        self._ready()
-        self.phase = "stepping"
+        self._expect("initialising", "end of initialisation mode")
+        try:
+            self._ready()
+        except Exception:
+            self.phase = "not initialised"  # for another try with better parameters
+            raise
+        self.phase = "initialised"
+
+    @guarded
+    def terminate(self) -> None:
+        self._expect("initialised", "terminate")
+        self.phase = "terminated"
+
+    def _expect(self, phase: str, call: str) -> None:
+        if self.phase != phase:
+            raise Refused(f"{call}: the FMU is {self.phase}")
 
     @guarded
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -108,16 +134,16 @@ class UnitSlave(Fmi2Slave):
         return message is None
 
     def _step(self, time: float, step: float) -> str | None:
-        if self.phase != "stepping":
-            return f"step at {time:.9g} s: the FMU is not initialised"
+        if self.phase != "initialised":
+            return f"step at {time:.9g} s: the FMU is {self.phase}"
         if not (math.isfinite(step) and step > 0.0):
             return f"step = {step}: must be > 0 s"
         if not abs(time - self.time) <= TIME_TOLERANCE * step:
             return f"time = {time!r}: the FMU stands at {self.time!r} s"
-        held = self._held()
+        held = self.ports.held(self.inputs)
         before = self.unit.state
         try:
-            message = self._not_finite() or self.unit.step(time, step, held)
+            message = self.ports.not_finite(self.inputs) or self.unit.step(time, step, held)
         except BROKEN_ARITHMETIC as error:
             message = where(error)
         if message is None:
@@ -128,41 +154,44 @@ class UnitSlave(Fmi2Slave):
 
     # variables
 
-    @guarded
-    def get_real(self, vrs: list[int]) -> list[Any]:
-        key = tuple(vrs)
-        readers = self._readers.get(key)
-        if readers is None:  # hosts repeat themselves: the runs of a request are found once
-            readers = self._readers[key] = [self._reader(run) for run in self.ports.runs(key)]
-        return readers[0]() if len(readers) == 1 else [value for read in readers for value in read()]
-
-    get_integer = get_boolean = get_string = get_real
+    get_real, get_integer, get_boolean, get_string = (_getter(kind) for kind in KINDS)
+    set_integer, set_boolean, set_string = (_setter(kind) for kind in KINDS[1:])
 
     @guarded
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         first, last = (vrs[0], vrs[-1]) if vrs else (0, -1)
-        if vrs == self._run_of_inputs[first : last + 1]:  # the usual case
+        if self.phase == "initialised" and vrs == self._run_of_inputs[first : last + 1]:  # the usual case
             self.inputs[first : last + 1] = values
         else:
-            for vr, value in zip(vrs, values, strict=True):
-                self._set(vr, value)
-        if self.phase == "initializing":
+            self._set("Real", vrs, values)
+
+    def _get(self, kind: str, vrs: list[int]) -> list[Any]:
+        key = (kind, *vrs)
+        readers = self._readers.get(key)
+        if readers is None:  # hosts repeat themselves: the runs of a request are found once
+            readers = self._readers[key] = [self._reader(run) for run in self.ports.runs(vrs, kind)]
+        return readers[0]() if len(readers) == 1 else [value for read in readers for value in read()]
+
+    def _set(self, kind: str, vrs: list[int], values: Sequence[Any]) -> None:
+        """All of them or, where one is refused, none."""
+        inputs, changed = self.inputs.copy(), dict(self.changed)
+        for vr, value in zip(vrs, values, strict=True):
+            causality, name, _ = self.ports.place(vr, kind)
+            if causality == "output":
+                raise Refused(f"{name} = {value}: an output cannot be set")
+            if self.phase == "terminated":
+                raise Refused(f"{name} = {value}: the FMU is terminated")
+            if causality == "input":
+                inputs[vr] = value
+            elif self.phase == "initialised":
+                raise Refused(f"{name} = {value}: a parameter cannot be set after initialisation")
+            elif isinstance(value, float) and not math.isfinite(value):
+                raise Refused(f"{name} = {value}: must be finite")
+            else:
+                changed[name] = value
+        self.inputs[:], self.changed = inputs, changed
+        if self.phase != "initialised":
             self.unit = None
-
-    set_integer = set_boolean = set_string = set_real
-
-    def _set(self, vr: int, value: Any) -> None:
-        causality, name, _ = self.ports.place(vr)
-        if causality == "input":
-            self.inputs[vr] = value
-        elif causality == "output":
-            raise Refused(f"{name} = {value}: an output cannot be set")
-        elif self.phase == "stepping":
-            raise Refused(f"{name} = {value}: a parameter cannot be set after initialisation")
-        elif isinstance(value, float) and not math.isfinite(value):
-            raise Refused(f"{name} = {value}: must be finite")
-        else:
-            self.changed = {**self.changed, name: value}
 
     def _reader(self, run: Run) -> Reader:
         name, part = run.name, run.part
@@ -182,12 +211,14 @@ class UnitSlave(Fmi2Slave):
     @guarded
     def _get_fmu_state(self) -> Snapshot:
         unit = None if self.unit is None else self.unit.state
-        return Snapshot(self.phase, self.time, self.inputs.tobytes(), self.changed, unit)
+        return Snapshot(self.guid, self.phase, self.time, self.inputs.tobytes(), self.changed, unit)
 
     @guarded
     def _set_fmu_state(self, state: Snapshot | Refused) -> None:
         if isinstance(state, Refused):
             raise state
+        if state.guid != self.guid:
+            raise Refused(f"state: of another FMU, with the GUID {state.guid}")
         if state.unit is None or (state.changed is not self.changed and state.changed != self.changed):
             self.unit = None
         self.phase, self.time, self.changed = state.phase, state.time, state.changed
@@ -200,27 +231,31 @@ class UnitSlave(Fmi2Slave):
     @staticmethod
     def _fmu_state_to_bytes(state: Snapshot) -> bytes:
         try:
-            return pickle.dumps(tuple(state), protocol=5)
+            content = pickle.dumps(tuple(state), protocol=5)
         except Exception as error:  # no instance to protect here: the message travels in the bytes
-            return pickle.dumps(f"state: cannot be serialised: {error}")
+            content = pickle.dumps(f"state: cannot be serialised: {error}")
+        return hashlib.sha256(content).digest() + content
 
     @staticmethod
     def _fmu_state_from_bytes(data: bytes) -> Snapshot | Refused:
+        content = data[hashlib.sha256().digest_size :]
+        if not data.startswith(hashlib.sha256(content).digest()):
+            return Refused(f"state: cannot be read back: these {len(data)} bytes are not those of a state, or not all of them")
         try:
-            content = pickle.loads(data)
-        except Exception as error:  # damaged bytes raise anything
+            found = pickle.loads(content)
+        except Exception as error:
             return Refused(f"state: cannot be read back: {error}")
-        return Refused(content) if isinstance(content, str) else Snapshot(*content)
+        return Refused(found) if isinstance(found, str) else Snapshot(*found)
 
     # inside
 
     def _ready(self) -> Any:
         """The initialised unit; made when first asked for, anew when something was set since."""
         if self.unit is None:
-            if self.phase == "instantiated":
+            if self.phase == "not initialised":
                 raise Refused("outputs: not defined before initialisation")
-            unit, held = self._make_unit(), self._held()
-            message = self._not_finite() or unit.initialize(self.time, held)
+            unit = self._make_unit()
+            message = self.ports.not_finite(self.inputs) or unit.initialize(self.time, self.ports.held(self.inputs))
             if message is not None:
                 raise Refused(message)
             self.unit = unit
@@ -236,15 +271,3 @@ class UnitSlave(Fmi2Slave):
             if name not in given or given[name][0] != port[0]:
                 raise Refused(f"{CONFIGURATION}: changes the output {name}; such an FMU must be exported anew")
         return self.unit_class(tree)
-
-    def _held(self) -> dict[str, np.ndarray]:
-        """A copy of the inputs by name, which the unit may keep."""
-        values = self.inputs.copy()
-        return {name: values[part] for name, part in self.ports.input_slices.items()}
-
-    def _not_finite(self) -> str | None:
-        if np.isfinite(self.inputs).all():
-            return None
-        bad = next(i for i, value in enumerate(self.inputs) if not math.isfinite(value))
-        _, name, i = self.ports.place(bad)
-        return f"{name}[{i + 1}] = {self.inputs[bad]}: must be finite"

@@ -490,15 +490,17 @@ FMI int fmi2FreeFMUstate(void *c, void **state) {
 FMI int fmi2SerializedFMUstateSize(void *c, void *state, size_t *size) {
     const char *result;
     uint64_t number = 0;
+    if (known(c) && !size) return complain(c, "state: no place for its size was given");
     int status = state_call(c, STATE_SIZE, (uintptr_t)state, NULL, 0, &result, sizeof number);
     if (status > WARNING) return status;
     memcpy(&number, result, sizeof number);
-    if (size) *size = (size_t)number;
+    *size = (size_t)number;
     return status;
 }
 
 FMI int fmi2SerializeFMUstate(void *c, void *state, char data[], size_t size) {
     const char *result;
+    if (known(c) && !data) return complain(c, "state: no place for its bytes was given");
     int status = state_call(c, STATE_BYTES, (uintptr_t)state, NULL, 0, &result, size);
     if (status <= WARNING) memcpy(data, result, size);
     return status;

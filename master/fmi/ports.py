@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .description import Variable, scalar_names
 from .schema import Parameter
 
+KINDS = ("Real", "Integer", "Boolean", "String")  # of FMI variables; ports are real
 PortTable = Mapping[str, tuple[int, str, str]]  # name -> (size, unit, description)
 
 
@@ -37,22 +42,39 @@ class Ports:
             self.input_slices[name] = slice(first, first + port[0])
             first += port[0]
 
-    def place(self, reference: int) -> tuple[str, str, int]:
-        """(causality, name, index in the port) of a value reference. Raises ValueError if there is none."""
+    def place(self, reference: int, kind: str = "Real") -> tuple[str, str, int]:
+        """(causality, name, index in the port) of a value reference. Raises ValueError if there is none of that kind."""
         if not 0 <= reference < len(self._places):
             raise ValueError(f"value reference = {reference}: must be below {len(self._places)}")
-        return self._places[reference]
+        causality, name, _ = place = self._places[reference]
+        own = self.parameters[name].kind if causality == "parameter" else "Real"
+        if kind != own:
+            raise ValueError(f"{name}: asked for as {kind}, is {own}")
+        return place
 
-    def runs(self, references: Sequence[int]) -> Iterator[Run]:
-        """`references` in order, cut into runs that one port can answer at once."""
+    def runs(self, references: Sequence[int], kind: str = "Real") -> Iterator[Run]:
+        """`references` of that kind in order, cut into runs that one port can answer at once. Raises ValueError as `place`."""
         i = 0
         while i < len(references):
-            causality, name, first = self.place(references[i])
+            causality, name, first = self.place(references[i], kind)
             length, rest = 1, references[i:]
-            while length < len(rest) and self.place(rest[length]) == (causality, name, first + length):
+            while length < len(rest) and self.place(rest[length], kind) == (causality, name, first + length):
                 length += 1
             yield Run(causality, name, slice(first, first + length))
             i += length
+
+    def held(self, inputs: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """A copy of all inputs by name, which the unit may keep."""
+        values = inputs.copy()
+        return {name: values[part] for name, part in self.input_slices.items()}
+
+    def not_finite(self, inputs: NDArray[np.float64]) -> str | None:
+        """What to say of the first input that is not finite, if there is one."""
+        if np.isfinite(inputs).all():
+            return None
+        bad = next(i for i, value in enumerate(inputs) if not math.isfinite(value))
+        _, name, i = self.place(bad)
+        return f"{name}[{i + 1}] = {inputs[bad]}: must be finite"
 
     def variables(self) -> list[Variable]:
         """Scalar variables for the model description, in the order of their value references."""

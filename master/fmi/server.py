@@ -150,7 +150,10 @@ class Server:
 
     @staticmethod
     def _read_state(slot: _Slot, data: memoryview) -> None:
-        slot.states[_number(data)] = slot.slave._fmu_state_from_bytes(bytes(data[8:]))
+        state = slot.slave._fmu_state_from_bytes(bytes(data[8:]))
+        if isinstance(state, Refused):
+            raise state
+        slot.states[_number(data)] = state
 
 
 class _DiscardedError(Exception):
