@@ -108,7 +108,10 @@ class PipeUnit:
             return f"{what}: {corrections}{nor}, residual {result.residual:.2e} of the largest section force"
         self.remark = ""
         if len(parts) > 1:
-            self.remark = f"{what}: done in {len(parts)} sub-steps of {min(parts):g} s or more, {result.iterations} corrections"
+            self.remark = (
+                f"{what}: done in {len(parts)} sub-steps of {min(parts):g} s or more, {result.iterations} corrections; pose and "
+                "work of the top are exact, but its velocity jumps at both ends of the step instead of being smooth"
+            )
         self.state = (result.state, result.top, result.impedance, result.iterations, result.residual)
         return None
 
