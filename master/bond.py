@@ -148,7 +148,7 @@ class FmuEnd:
         self._mean, self._signs = result if mean is None else mean, signs
         self._derivative = derivative if derivative in fmu.ports else None
         self._yielding = yielding if yielding in fmu.ports and all(name in fmu.ports for name in met) else ""
-        self._met = met
+        self._met, self.yields = met, bool(self._yielding)
         self.rollback = rollback and fmu.can_rollback
         self._saved: ctypes.c_void_p | None = None
         self._moved = False

@@ -12,6 +12,7 @@ from master.drive import OnBond, Row
 from master.fmu import Fmu
 from master.ledger import Ledger
 from master.recorder import Signal
+from master.remarks import Remarks
 from master.units import General, Wiring, loaded
 
 
@@ -32,7 +33,7 @@ class Bonded(OnBond):
         table, rules, bond = scene.bond, scene.coupling, wiring.bond()
         impedance, mobility = wiring.fmus[table.impedance], wiring.fmus[table.mobility]
         self.time = 0.0
-        self.units: Mapping[str, Fmu] = wiring.fmus
+        self.units, self.remarks = wiring.fmus, Remarks()
         self._wires, self._macro_step = wiring.connections(), scene.simulation.macro_step
         if rules.scheme == "energy-consistent":
             self._ends = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import importlib
 import json
 import sys
@@ -25,6 +26,8 @@ def run(options: argparse.Namespace) -> int:
     folder = _folder(options.output or Path("results") / scene.name)
     from master.run import simulate  # matplotlib and FMPy take a second to import: not for `scenes` or a bad scene
 
+    if not faulthandler.is_enabled() and sys.__stderr__ is not None:
+        faulthandler.enable(sys.__stderr__)  # an FMU's crash says where
     result = simulate(scene, folder, sys.stderr)
     _say(f"{result.screen}\nresults in {folder}")
     return 0 if result.passed else 1

@@ -25,12 +25,15 @@ the round-off of the ends' answers is met to that round-off: a residual that no 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .bond import Bond, Matrix, Vector
 from .explicit import Explicit
 from .extrapolation import Extrapolation
 from .fmu import StepFailed, StepRejected
+from .foreseen import Foreseen
 from .one_solve import OneSolve
 from .step import SLIVER, Check, Counters, CouplingFailed, End, Step, accept
 
@@ -42,6 +45,7 @@ FALLING = 0.3  # of the defect of the round before: more is no progress
 ROUND_OFF = 1e-10  # of the product of the magnitudes: without progress below this the ends' own round-off is reached
 EASY = 3  # rounds of an easy step
 PATIENCE = 4  # easy steps in a row after which a halved step grows
+FIRST_STEP = 2.0**-10  # of the macro step, where one end is foreseen
 SMALLEST_STEP = 2.0**-12  # of the macro step
 
 
@@ -51,7 +55,7 @@ class EnergyConsistent:
     `check` sees a step before it is committed (the ends' outputs are those of its end) and may send it back.
     """
 
-    words = "energy-consistent, iterated with rollback"
+    words: str = "energy-consistent, iterated with rollback"
 
     def __init__(
         self, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
@@ -197,13 +201,49 @@ class EnergyConsistent:
             self._Z = self._Z + np.outer(d_force - self._Z @ d_flow, weighted) / size
 
 
+class OneSided(EnergyConsistent):
+    """EC-IJ against a mobility end that cannot roll back, see `master.foreseen`; an impedance end that yields need not roll back either."""
+
+    def __init__(
+        self, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
+    ) -> None:
+        self._foreseen = Foreseen(mobility, bond)
+        super().__init__(impedance, self._foreseen, bond, macro_step, tolerance, check)
+        self.wanted, self._easy = FIRST_STEP * macro_step, -PATIENCE  # all short steps add up to whole macro steps
+        how = "iterated on one side" if impedance.rollback else "not iterated"
+        self.words = (
+            f"energy-consistent, {how}: without rollback a unit is solved once a step, with its answer foreseen; "
+            "a residual and a kinematic gap are left"
+        )
+
+    def _attempt(self, time: float, step: float) -> Step:
+        trial = super()._attempt(time, step) if self.impedance.rollback else self._met(time, step)
+        if not self._converged:
+            return trial
+        flow = self._foreseen.take(time, step, trial.effort, trial.flow)
+        return replace(trial, flow=flow, residual=step * float(trial.effort @ (flow - trial.flow)))
+
+    def _met(self, time: float, step: float) -> Step:
+        """The impedance end solved once, on the law of the other."""
+        effort = self._guess.at(time + step / 2)[1]
+        flow = self._foreseen.solve(time, step, effort)
+        Y = self._foreseen.derivative()
+        try:
+            met = self.impedance.meet(time, step, flow - Y @ effort, Y)
+        except StepRejected as rejection:
+            raise CouplingFailed(time, step, float("nan"), f"{rejection}; it cannot roll back") from None
+        assert met is not None
+        self._converged = True
+        return Step(time, step, *met, 0.0, 1)
+
+
 SCHEMES = ("energy-consistent", "serial", "parallel")
 
 
 def coupling(
     scheme: str, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
 ) -> EnergyConsistent | OneSolve | Explicit:
-    """The coupling named `scheme`; the energy-consistent one with a single solve where an end cannot roll back.
+    """The coupling named `scheme`; the energy-consistent one with a single solve of what cannot roll back.
 
     Raises ValueError for a name that is not in SCHEMES.
     """
@@ -211,6 +251,8 @@ def coupling(
         raise ValueError(f"scheme = {scheme!r}: must be one of {', '.join(SCHEMES)}")
     if scheme != "energy-consistent":
         return Explicit(impedance, mobility, bond, macro_step, scheme == "serial", check)
-    if not (impedance.rollback and mobility.rollback):
+    if not (impedance.rollback or impedance.yields):
         return OneSolve(impedance, mobility, bond, macro_step, check)
+    if not (impedance.rollback and mobility.rollback):
+        return OneSided(impedance, mobility, bond, macro_step, tolerance, check)
     return EnergyConsistent(impedance, mobility, bond, macro_step, tolerance, check)

@@ -18,6 +18,7 @@ from master.hang_off import hang_off
 from master.ledger import Columns, Ledger
 from master.prepared import Prepared
 from master.recorder import Source
+from master.remarks import Remarks
 from master.scene import Sections
 from master.sections import Load, TopMotion, mean_load
 
@@ -41,6 +42,7 @@ class Drive(Protocol):
 
     time: float
     ledger: Ledger
+    remarks: Remarks
 
     @property
     def units(self) -> Mapping[str, Fmu]:
@@ -65,6 +67,8 @@ class OnBond:
     """What every drive with two FMUs on a power bond does alike."""
 
     time: float
+    units: Mapping[str, Fmu]
+    remarks: Remarks
     _macro_step: float
     _coupling: EnergyConsistent | OneSolve | Explicit
 
@@ -76,6 +80,7 @@ class OnBond:
     def advance(self, end: float) -> None:
         """See `Drive`."""
         step = self._coupling.advance(self.time, end - self.time)
+        self.remarks.note(self.units)
         self.time = snapped(step.time + step.step, self._macro_step, end)
 
 
@@ -85,7 +90,7 @@ class Coupled(OnBond):
     def __init__(self, pipe: Fmu, vessel: Fmu, sections: Sections) -> None:
         rules, bond = sections.coupling, hang_off()
         self.time = 0.0
-        self.units: Mapping[str, Fmu] = {"pipe": pipe, "vessel": vessel}
+        self.units, self.remarks = {"pipe": pipe, "vessel": vessel}, Remarks()
         self._clamped = sections.pipe.get("top") != "pinned"
         if rules.scheme == "energy-consistent":
             self._pipe, self._vessel = impedance_end(pipe, bond, rollback=rules.rollback), mobility_end(vessel, bond)
@@ -135,6 +140,7 @@ class Prescribed:
         rules = sections.coupling
         self.time = 0.0
         self.units: Mapping[str, Fmu] = {"pipe": pipe}
+        self.remarks = Remarks()
         self._pipe, self._motion, self._mover = impedance_end(pipe, hang_off()), motion, Mover()
         mover = (self._mover, Columns(work=("supplied_work",), bond="bond_work"))
         self.ledger = Ledger([(pipe, columns(pipe, "top_work")), mover], rules.energy_check, rules.on_violation)
@@ -153,6 +159,7 @@ class Prescribed:
             self._rejected += 1
             step = self._wanted = step / 2
         self.time = snapped(self.time + step, self._macro_step, end)
+        self.remarks.note(self.units)
         self._wanted = min(2.0 * self._wanted, self._macro_step)
         self._steps += 1
 

@@ -94,6 +94,7 @@ class Fmu:
         except Exception as error:  # as above; the FMU's own words are in the log
             folder.cleanup()
             raise FmuFailed(f"{self.name}: cannot be loaded: {self._words(str(error))}") from None
+        self.remark = ""  # the FMU's last warning about its last step
         self._close = weakref.finalize(self, _free, self._fmu, self._states, folder)  # at exit at the latest
         self._component = ctypes.c_void_p(self._fmu.component)
         self._channels: dict[Names, _Channel] = {}
@@ -169,9 +170,11 @@ class Fmu:
 
         Raises StepRejected if the FMU discards the step, FmuFailed if it breaks down.
         """
+        self.messages.clear()
         status = self._do_step(self._component, ctypes.c_double(time), ctypes.c_double(step), final)
         if status > 1:
             raise self._failure(f"step of {step:.6g} s at {time:.9g} s", STEP_FAILURES.get(status, FmuFailed))
+        self.remark = self._words("") if self.messages else ""
 
     def snapshot(self) -> ctypes.c_void_p:
         """A handle to the FMU's whole state, for `restore`; freed by `release` or `close`."""
@@ -241,7 +244,7 @@ class Fmu:
         return kind(f"{self.name}: {what}: {words}")
 
     def _words(self, otherwise: str) -> str:
-        """The latest complaint in the log; forgets it."""
+        """The latest warning or complaint in the log; forgets it."""
         spoken = [text for status, text in self.messages if status > 0]
         self.messages.clear()
         return spoken[-1] if spoken else otherwise

@@ -76,5 +76,8 @@ def screen(summary: Mapping[str, Any], title: str) -> str:
         ]
     left = f"the bond made {summary['interface_residual_J']:.2g} J of {summary['exchanged_energy_J']:.3g} J exchanged"
     rows += [("coupling", f"{summary['coupling']}; {left}"), ("energy check", summary["energy_check"].removeprefix("energy check "))]
+    for unit, count in summary["steps_with_remarks"].items():
+        of = f"of {count} of {summary['macro_steps']} steps"
+        rows.append((f"{unit} remarks", f"{of}, first: {summary['first_remarks'][unit]}"))
     width = max(len(name) for name, _ in rows)
     return "\n".join([f"{summary['scene']}: {title}", *(f"  {name:{width}}  {text}" for name, text in rows)])

@@ -1,12 +1,12 @@
 """A run from the scene to the files: prepare, load the FMUs, step to the end, write what was recorded.
 
 Whatever ends a run early, a failed step, a broken energy balance or Ctrl-C, the results up to there are written. The signals
-are written as they come: even where an FMU takes the process with it, signals.csv has every step before.
+are written as they come, and a summary that is replaced at the end says that the process died: even where an FMU takes the process
+with it, signals.csv has every step before.
 """
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 import threading
 import time as clock
@@ -30,6 +30,7 @@ from master.scene import Scene
 from master.units import General
 
 OWN_FILES = ("signals.csv", "shapes.npz", "summary.json", "energy.png", "fig[3-9]_*.png")
+DIED = "the process ended within the run, as it does where an FMU crashes; signals.csv has every step before"
 SLOW = 8.0  # s without a sign of life before a word about compiling
 
 
@@ -62,6 +63,7 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
             stack.callback(patience.cancel)
             simulation, drive, kept = scene.sections.simulation, *_open(scene, stack)
             _clear(folder)
+            report.write_summary(folder / "summary.json", {"scene": scene.name, "status": "died", "message": DIED})
             stream = stack.enter_context((folder / "signals.csv").open("w", encoding="utf-8"))
             recorder = Recorder(drive.units, simulation.recording_step, simulation.snapshots, kept, stream)
             started = clock.perf_counter()
@@ -69,7 +71,9 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
             wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
             if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
                 recorder.record_shape(drive.time)
-            account = {"coupling": drive.scheme, **_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
+            account: dict[str, Any] = {"coupling": drive.scheme}
+            account |= {"steps_with_remarks": drive.remarks.count, "first_remarks": drive.remarks.first}
+            account |= {**_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
             account |= drive.ledger.summary()
             account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}
             account |= {"energy_check": ending.message if ending.status == "stopped" else drive.ledger.verdict()}
@@ -142,7 +146,7 @@ def _clear(folder: Path) -> None:
 def _move_into_place(scratch: Path, folder: Path) -> None:
     """The finished files join the signals."""
     for new in sorted(scratch.iterdir()):
-        shutil.move(new, folder / new.name)
+        new.replace(folder / new.name)
 
 
 @contextmanager

@@ -15,8 +15,11 @@ SLIVER = 1e-9  # of a step: a remainder that is round-off of the time
 class End(Protocol):
     """One end of the bond, see `master.bond.FmuEnd`."""
 
-    solves: int
+    @property
+    def solves(self) -> int: ...
+
     rollback: bool
+    yields: bool
 
     def begin(self) -> None: ...
     def solve(self, time: float, step: float, held: Vector) -> Vector: ...

@@ -8,7 +8,7 @@ from .energy import energies
 from .line import Array, Line, Water
 from .newton import solve_step
 from .node_kernel import advance
-from .step_kernel import element_strains
+from .step_kernel import element_strains, folded
 
 MAX_CORRECTIONS = 25
 CAREFUL_CORRECTIONS = 100
@@ -41,6 +41,7 @@ class StepResult(NamedTuple):
     impedance: Array  # (6, 6) d top / d (mean velocity, mean angular velocity)
     iterations: int
     residual: float  # of the largest element force
+    folded: bool = False  # not converged because an element would be bent or twisted past half a turn
 
 
 def rest(line: Line, position: Array, quaternion: Array, time: float) -> PipeState:
@@ -61,19 +62,20 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     """
     top = h * np.concatenate([velocity, spin])
     old = state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain
-    spent = 0
+    spent, fold = 0, False
     for guess, careful in ((2.0 * state.last - state.before, False), (state.last, True), (np.zeros_like(state.last), True)):
         limit = CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
         converged, x, strain, force, tangent, works, iterations, residual = solve_step(
             line, water, h, *old, h * guess, top, h * mobility, careful, limit
         )
         spent += iterations
-        if converged:
+        fold = converged and folded(line.length, state.strain, strain)
+        if converged and not fold:
             break
     if not line.top_clamped:
         force[3:] = 0.0
-    if not converged:
-        return StepResult(False, state, force, h * tangent, spent, residual)
+    if fold or not converged:
+        return StepResult(False, state, force, h * tangent, spent, residual, fold)
     quaternion, rate, flow = np.empty_like(state.quaternion), np.empty_like(state.rate), np.empty_like(state.flow)
     speed = np.empty_like(state.velocity)
     advance(line, h, state.quaternion, state.velocity, state.rate, state.flow, x, quaternion, speed, rate, flow)

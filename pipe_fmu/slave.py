@@ -101,12 +101,17 @@ class PipeUnit:
         result, parts = substeps.divide(step, start, inputs["velocity"], inputs["angular_velocity"], h, most)
         what = f"step of {h:g} s at t = {time:g} s"
         if not result.converged:
-            nor = f"nor in sub-steps of {h / most:g} s, " if most > 1 else ""
+            nor = f", nor in sub-steps of {h / most:g} s" if most > 1 else ""
+            if result.folded:
+                return f"{what}{nor}: an element would be bent or twisted past half a turn between its nodes; more nodes may help"
             corrections = f"no convergence after {result.iterations} corrections"
-            return f"{what}: {corrections}, {nor}residual {result.residual:.2e} of the largest section force"
+            return f"{what}: {corrections}{nor}, residual {result.residual:.2e} of the largest section force"
         self.remark = ""
         if len(parts) > 1:
-            self.remark = f"{what}: done in {len(parts)} sub-steps of {min(parts):g} s or more, {result.iterations} corrections"
+            self.remark = (
+                f"{what}: done in {len(parts)} sub-steps of {min(parts):g} s or more, {result.iterations} corrections; pose and "
+                "work of the top are exact, but its velocity jumps at both ends of the step instead of being smooth"
+            )
         self.state = (result.state, result.top, result.impedance, result.iterations, result.residual)
         return None
 

@@ -48,6 +48,19 @@ def element_strains(line, position, quaternion, out):
 
 
 @kernel
+def folded(length, old, new):
+    """Whether the turn between the ends of an element, from strains `old` to `new` (n - 1, 7), went past half a turn: its rotation vector
+    then jumps to the other end of the same axis, and the strain energy with it."""
+    for e in range(length.shape[0]):
+        change = 0.0
+        for i in range(3, 6):
+            change += (new[e, i] - old[e, i]) ** 2
+        if math.sqrt(change) * length[e] > math.pi:
+            return True
+    return False
+
+
+@kernel
 def step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, sharp, system, works):
     """Residual of the step for trial increments `x` (n, 6), and the tangent if `fresh`, into `system` = (diagonal, lower, upper, residual).
 

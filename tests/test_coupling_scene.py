@@ -59,6 +59,11 @@ def ran(folder, out, *changes, scene="tied"):
     return code, json.loads((out / "summary.json").read_text())
 
 
+def failing(kind):
+    """The change of the scene after which the spring fails from 2 s on."""
+    return f"units.coil.parameters={{stiffness=4.0, 'failure.start'=1.999, 'failure.above'=0.0, 'failure.kind'='{kind}'}}"
+
+
 def columns(out):
     header = (out / "signals.csv").read_text().partition("\n")[0].split(",")
     values = np.loadtxt(out / "signals.csv", delimiter=",", skiprows=1)
@@ -155,29 +160,31 @@ def test_commands_for_a_pipe_refuse_it(folder, capsys):
     assert "needs one with [pipe]" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("kind", ["message", "arithmetic", "bug"])
+@pytest.mark.parametrize("kind", ["message", "arithmetic", "bug", "nan"])
 def test_an_fmu_that_fails_for_good_ends_the_run_with_its_results_so_far(folder, tmp_path, capsys, kind):
-    changes = [f"units.coil.parameters={{stiffness=4.0, 'failure.start'=2.0, 'failure.above'=0.0, 'failure.kind'='{kind}'}}"]
-    code, summary = ran(folder, tmp_path, *changes)
+    code, summary = ran(folder, tmp_path, failing(kind))
     assert code == 1
     assert summary["status"] == "failed"
+    assert "failed at 2 s" in summary["message"]
     assert summary["duration_s"] == pytest.approx(2.0)
     assert columns(tmp_path)["time"][-1] == pytest.approx(2.0)
-    assert "planted" in capsys.readouterr().out
+    assert ("not finite" if kind == "nan" else "planted") in capsys.readouterr().out
 
 
-def test_the_signals_outlive_a_process_that_an_fmu_kills(folder, tmp_path):
-    program = f"""
-import os
-from master.__main__ import main
-from master.fmu import Fmu
-step = Fmu.step
-def dying(fmu, time, length, final=False):
-    if time > 1.95:
-        os._exit(139)
-    step(fmu, time, length, final)
-Fmu.step = dying
-main(["run", {str(folder / "tied.toml")!r}, "-o", {str(tmp_path / "out")!r}])
-"""
-    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 139
-    np.testing.assert_allclose(columns(tmp_path / "out")["time"], 0.1 * np.arange(21), atol=1e-12)
+def test_an_fmu_that_crashes_leaves_its_results_so_far_and_a_summary_that_says_so(folder, tmp_path):
+    call = [sys.executable, "-m", "master", "run", str(folder / "tied.toml"), "--set", failing("crash"), "-o", str(tmp_path)]
+    done = subprocess.run(call, check=False, capture_output=True, text=True)
+    assert done.returncode not in (0, 1, 2)  # the signal's
+    assert "in step" in done.stderr  # where
+    np.testing.assert_allclose(columns(tmp_path)["time"], 0.1 * np.arange(21), atol=1e-12)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["status"] == "died"
+    assert "signals.csv" in summary["message"]
+
+
+def test_what_a_unit_says_of_its_steps_is_in_the_report(folder, tmp_path, capsys):
+    code, summary = ran(folder, tmp_path, failing("remark"))
+    assert code == 0
+    assert summary["steps_with_remarks"] == {"coil": 30}
+    assert summary["first_remarks"] == {"coil": "planted remark, 50 % heard"}
+    assert "coil remarks  of 30 of 50 steps, first: planted remark, 50 % heard" in capsys.readouterr().out

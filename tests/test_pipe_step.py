@@ -9,6 +9,7 @@ import pytest
 from pipe_helpers import (
     HANGING,
     P16,
+    STILL,
     TANGENT,
     TANGENT_ATTITUDE,
     balance,
@@ -25,7 +26,7 @@ from pipe_helpers import (
     straight,
 )
 
-from pipe_fmu import AddedMass, PipeParameters, PipeUnit, Seabed, model, step_kernel
+from pipe_fmu import AddedMass, PipeParameters, PipeUnit, Seabed, integrator, model, step_kernel
 from pipe_fmu.integrator import WORKS
 
 TWO = (replace(P16, length=500.0), replace(P16, length=700.0, wall_thickness=0.0254, coating_thickness=0.02, coating_density=2000.0))
@@ -375,3 +376,18 @@ def test_unit_reports_a_failed_step_in_one_line_and_keeps_its_state():
     assert "no convergence" in message
     assert unit.state is before
     assert unit.step(0.0, 0.1, still) is None
+
+
+def test_a_step_that_would_twist_an_element_past_half_a_turn_is_refused():
+    """Its rotation vector would jump from pi to -pi, and torque and energy with it; Newton's method does not see that."""
+    s, line = bar(100.0, 3, axial=1e8, shear=1e8, torsion=1e4, bending=1e7, inertia=0.1)
+    position = np.outer(1.001 * s, [1.0, 0.0, 0.0])
+    twisted = np.array([rotation_vector_quaternion([angle * math.pi, 0.0, 0.0]) for angle in (0.0, 0.9, 1.89)])
+    start = integrator.rest(line, position, twisted, 0.0)
+    less, more = (integrator.step(line, STILL, start, np.zeros(3), np.array([spin, 0.0, 0.0]), 1e-3) for spin in (30.0, 33.0))
+    assert less.converged
+    gained = sum(integrator.energy_of(line, less.state)) - sum(integrator.energy_of(line, start))
+    assert gained == pytest.approx(less.state.top_work, rel=1e-9)
+    assert more.folded
+    assert not more.converged
+    assert more.state is start

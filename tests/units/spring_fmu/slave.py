@@ -5,6 +5,8 @@ Stands in for the pipe: takes the mean velocity over the step, returns the mean 
 
 from __future__ import annotations
 
+import math
+import signal
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -50,6 +52,7 @@ class SpringUnit:
 
     def __init__(self, parameters: Spring) -> None:
         self.p = parameters
+        self.remark = ""
         self.k = np.array([parameters.stiffness] * 3 + [parameters.turning] * 3)
         self.state: State
 
@@ -77,11 +80,17 @@ class SpringUnit:
                 raise RuntimeError("planted bug, 100 % certain")
             if planted.kind == "arithmetic":
                 raise FloatingPointError("invalid value encountered in a planted place")
-            return "planted failure: residual 1.0 after 20 iterations, 50 % left"
+            if planted.kind == "crash":
+                signal.raise_signal(signal.SIGSEGV)
+            if planted.kind == "message":
+                return "planted failure: residual 1.0 after 20 iterations, 50 % left"
+            self.remark, broken = ("planted remark, 50 % heard", 0.0) if planted.kind == "remark" else ("", math.nan)
+        else:
+            self.remark, broken = "", 0.0
         old, v = self.state.x, np.concatenate([inputs["velocity"], inputs["angular_velocity"]])
         new = old + h * v
         end = 2 * v - self.state.v if self.p.inertia else v
-        force = self._force(old, new) + self.p.damping * v + self.p.inertia * (end - self.state.v) / h
+        force = broken + self._force(old, new) + self.p.damping * v + self.p.inertia * (end - self.state.v) / h
         slope = self.k / 2 + self.p.hardening * 0.25 * (old**2 + 2 * old * new + 3 * new**2)
         diagonal = h * slope + self.p.damping + 2 * self.p.inertia / h
         work = self.state.top_work + h * force @ v

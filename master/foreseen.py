@@ -1,0 +1,137 @@
+"""What a step without rollback knows of the mobility end: its answer, foreseen, and made good once it is known.
+
+The end answers V = r + Y f. Its slope Y is that of the last step (port or directional derivatives, else measured by Broyden's update
+from step to step), in proportion to the step's length as a mass has it. What its state contributes, r, is extrapolated: as such, or as
+r = v + h a with the velocity v at the end of the last step, v_new = 2 V - v, and the acceleration a without f; whichever lately foresaw
+better. The impedance end solves its step against that law, by iteration as in `master.coupling` or, where it yields, at once. The
+mobility end then steps with the f found.
+
+Both hold the same f, whatever the ratio of their masses. What the mobility end moves beyond what was foreseen, the impedance end makes up
+for in the next step: a kinematic gap is left, small where the motion is smooth, and a residual H f . (V - V foreseen). The first steps are
+short, since nothing is known yet.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .bond import Bond, Matrix, Vector
+from .extrapolation import Extrapolation
+from .fmu import StepRejected
+from .step import CouplingFailed, End
+
+MEMORY = 0.5  # per step: how fast a foresight's past failure is forgotten
+
+
+class Foreseen:
+    """A mobility end by its law; `take` solves the end itself, for good. Nothing need be foreseen of an end that can roll back."""
+
+    rollback, yields = True, False
+
+    def __init__(self, end: End, bond: Bond) -> None:
+        self.end = end
+        flow, self._scale = end.result(), bond.flow_increments()
+        self._velocity, self._time, self._step = flow, 0.0, 0.0
+        self._seen: tuple[Vector, Vector] | None = None  # effort and acceleration of the last step, for `_measured`
+        self._slope = np.zeros((bond.size, bond.size))  # Y over the length of its step
+        self._plain = Extrapolation(flow, flow, self._size)
+        self._inert = Extrapolation(np.zeros(bond.size), np.zeros(bond.size), self._size)
+        self._errors = np.zeros(2)
+        self._behind = np.zeros(bond.size)  # what the impedance end has still to make up for
+        self._taken = False
+
+    @property
+    def solves(self) -> int:
+        """Solves of the end itself."""
+        return self.end.solves
+
+    def begin(self) -> None:
+        """A step begins."""
+        self._taken = False
+        self.end.begin()
+
+    def solve(self, time: float, step: float, held: Vector) -> Vector:
+        """The flow that the end is expected to answer."""
+        self._time, self._step = time, step
+        if self.end.rollback:
+            flow, slope = self.end.solve(time, step, held), self.end.derivative()
+            self._slope = self._slope if slope is None else slope / step
+            return flow + self._behind / step
+        plain, inert = self._candidates(time, step)
+        return (inert if self._errors[1] <= self._errors[0] else plain) + step * self._slope @ held + self._behind / step
+
+    def take(self, time: float, step: float, held: Vector, foretold: Vector) -> Vector:
+        """The flow that the end does answer, where the other end was told `foretold`.
+
+        Raises CouplingFailed where it discards, for there is no way back, and FmuFailed.
+        """
+        self._taken = True
+        foreseen = self._candidates(time, step)
+        try:
+            flow = self.end.solve(time, step, held)
+        except StepRejected as rejection:
+            raise CouplingFailed(time, step, float("nan"), f"{rejection}; it cannot roll back") from None
+        slope = self.end.derivative()
+        velocity = 2.0 * flow - self._velocity
+        self._slope = self._measured((flow - self._velocity) / step, held) if slope is None else slope / step
+        free = flow - step * self._slope @ held
+        missed = [self._size(free - guess) for guess in foreseen]
+        self._errors = np.maximum(missed, MEMORY * self._errors)
+        middle = time + step / 2
+        self._plain.add(middle, free, free)
+        acceleration = (free - self._velocity) / step
+        self._inert.add(middle, acceleration, acceleration)
+        self._velocity, self._behind = velocity, self._behind + step * (flow - foretold)
+        return flow
+
+    def derivative(self) -> Matrix:
+        """d(flow)/d(effort) of `solve`."""
+        return self._step * self._slope
+
+    def meet(self, time: float, step: float, free: Vector, mobility: Matrix) -> None:
+        """See `master.step.End`: it takes no flow."""
+
+    def result(self) -> Vector:
+        """The flow as it is."""
+        return self.end.result()
+
+    def mean(self) -> Vector:
+        """The flow as the mean over the last step."""
+        return self.end.mean()
+
+    def commit(self) -> None:
+        """Keep the step."""
+        self.end.commit()
+
+    def cancel(self) -> None:
+        """Go back. Raises CouplingFailed once the end itself is solved."""
+        if self._taken:
+            raise CouplingFailed(self._time, self._step, float("nan"), "the check sent the step back, and an FMU cannot roll back")
+        self.end.cancel()
+
+    def _measured(self, acceleration: Vector, effort: Vector) -> Matrix:
+        """The least change of the slope that explains the last two steps, symmetric and not negative; in units of the flows that count."""
+        scale, seen = self._scale, self._seen
+        self._seen = effort, acceleration
+        if seen is None:
+            return self._slope
+        slope = self._slope / np.outer(scale, scale)
+        change, answer = (effort - seen[0]) * scale, (acceleration - seen[1]) / scale
+        size = float(change @ change)
+        if size == 0.0:
+            return self._slope
+        missed = answer - slope @ change
+        update = np.outer(missed, change) / size
+        slope = slope + update + update.T - np.outer(change, change) * float(missed @ change) / size**2  # Powell's symmetric form
+        values, vectors = np.linalg.eigh(slope)
+        return np.outer(scale, scale) * (vectors * np.maximum(values, 0.0) @ vectors.T)
+
+    def _size(self, error: Vector) -> Any:
+        """Of an error of the flow, or of every row of several."""
+        return np.abs(error / self._scale).max(axis=-1)
+
+    def _candidates(self, time: float, step: float) -> tuple[Vector, Vector]:
+        middle = time + step / 2
+        return self._plain.at(middle)[0], self._velocity + step * self._inert.at(middle)[0]
