@@ -17,6 +17,7 @@ from master.__main__ import main
 from master.drive import Effort, pose_gap, top_tension
 from master.fmu import FmuFailed, StepRejected
 from master.ledger import EnergyCheckFailed
+from master.remarks import Remarks
 from master.scene import from_mapping, load
 
 
@@ -34,7 +35,7 @@ class Ports:
 class StillDrive:
     """Units at rest that exchange a little energy; `fate` says what happens at 1 s."""
 
-    scheme = "energy-consistent"
+    scheme, remarks = "energy-consistent", Remarks()
     ledger = SimpleNamespace(
         kinds={"pipe.kinetic_energy": "stored"},
         names=["pipe.kinetic_energy", "interface_residual", "closure", "exchanged"],
