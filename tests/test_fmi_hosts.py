@@ -14,7 +14,7 @@ from hosts import NotHereError, error, exchange, install, reference, residual, r
 from run_host import own
 
 from master.__main__ import main
-from master.fmi.system import ECCO
+from master.fmi.system import ECCO, PORTS
 
 END = 6.0  # s
 STEPS = (0.05, 0.01)  # s
@@ -117,3 +117,19 @@ def test_ecco_does_the_parallel_exchange_in_steps_of_its_choice(host, hosted, tm
     assert ECCO["MinimumStepSize"] - 1e-8 < steps.min()
     assert steps.max() < longest + 1e-8
     assert error(rows, exact) < error(exchange(files, steps_of(longest)), exact) + ROUND_OFF
+
+
+def test_libcosim_connects_the_mechanical_ports_as_such(hosted, exported, exchanged, tmp_path):
+    """The port groups of both model descriptions, connected whole, are the connections of the structure one by one."""
+    files = shutil.copytree(exported, tmp_path / "whole")
+    structure = files / "OspSystemStructure.xml"
+    before, _, rest = structure.read_text().partition("<Connections>")
+    groups = "".join(
+        "<VariableGroupConnection>"
+        + "".join(f'<VariableGroup simulator="{unit}" name="{port[1]}"/>' for unit in ("vessel", "pipe"))
+        + "</VariableGroupConnection>"
+        for port in PORTS["pipe"]
+    )
+    structure.write_text(f"{before}<Connections>{groups}</Connections>{rest.partition('</Connections>')[2]}")
+    rows = hosted("libcosim", files, STEPS[0])
+    np.testing.assert_allclose(rows[:, 1:], exchanged[STEPS[0]][:, 1:], rtol=ROUND_OFF, atol=ROUND_OFF)
