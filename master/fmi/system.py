@@ -1,8 +1,9 @@
 """Files that tell other hosts how pipe and vessel are connected: SSP 1.0, and those of the Open Simulation Platform (OSP).
 
 Hosts without rollback exchange values once a step. What suits them is the vessel's velocity at the end of its step, held by
-the pipe over the next one, and the pipe's mean pull, held by the vessel: of first order in the step, and stable for vessels
-well above the mass that moves with the pipe's end (in the paper's scene at 0.05 s from 600 t on, not at 200 t). A master that iterates connects the vessel's mean velocity instead (`master.bond`).
+the pipe over the next one, and the pipe's mean pull, held by the vessel: of first order in the step, and stable for vessels well
+above the mass that moves with the pipe's end (in the paper's scene at 0.05 s at 640 t, not at 190 t). A master that iterates
+connects the vessel's mean velocity instead (`master.bond`).
 """
 
 from __future__ import annotations
