@@ -1,7 +1,7 @@
-"""A foreign host on exported files, as a program: ``run_host.py HOST FOLDER STEP END RESULT``.
+"""A host on exported files, as a program: ``run_host.py HOST FOLDER STEP END RESULT``.
 
-Writes to the file RESULT one line of JSON per step: time, hang-off position (3) [m],
-work done on the pipe and on the vessel through the bond [J].
+Writes to the file RESULT one line of JSON per step: time, hang-off position (3) [m], work done on the pipe and on the vessel through the
+bond [J], all as the FMUs report them. Each host is a function from (folder, step, end) to these rows.
 """
 
 from __future__ import annotations
@@ -19,26 +19,56 @@ NANO = 1e-9  # s, libcosim's unit of time
 Rows = Iterator[list[float]]
 
 
-def libcosim(folder: Path, step: float, end: float) -> Rows:
-    """The OSP structure with its fixed step."""
-    from libcosimpy.CosimExecution import CosimExecution
+def own(folder: Path, step: float, end: float) -> Rows:
+    """The master of this package: energy-consistent, iterated with rollback."""
+    from master.bond import impedance_end, mobility_end
+    from master.coupling import EnergyConsistent
+    from master.fmu import Fmu
+    from master.hang_off import hang_off
 
-    structure = folder / "OspSystemStructure.xml"
-    structure.write_text(re.sub("<BaseStepSize>.*?<", f"<BaseStepSize>{step}<", structure.read_text()))
-    return _march(CosimExecution.from_osp_config_file(osp_path=str(folder)), end)
+    with Fmu(folder / "pipe.fmu", "pipe") as pipe, Fmu(folder / "vessel.fmu", "vessel") as vessel:
+        pipe.initialize()
+        vessel.initialize(inputs={name: pipe.get(name) for name in ("force", "moment")})
+        bond = hang_off()
+        coupling = EnergyConsistent(impedance_end(pipe, bond), mobility_end(vessel, bond), bond, step)
+        for i in range(round(end / step)):
+            time = i * step
+            while (i + 1) * step - time > 1e-9 * step:
+                time += coupling.advance(time, (i + 1) * step - time).step
+            yield [time, *vessel.get("hang_off_position"), *pipe.get("top_work"), *vessel.get("bond_work")]
+
+
+def fmpy_ssp(folder: Path, step: float, end: float) -> Rows:
+    """FMPy's simulation of the SSP file: a fixed step, all inputs zero in the first."""
+    from fmpy.ssp.simulation import simulate_ssp
+
+    result = simulate_ssp(str(folder / "system.ssp"), stop_time=end - 0.5 * step, step_size=step)
+    columns = [result[f"{unit}.{name}"] for unit, name in WATCHED]
+    for time, *values in zip(result["time"], *columns, strict=True):
+        yield [time + step, *values]
+
+
+def libcosim(folder: Path, step: float, end: float) -> Rows:
+    """libcosim on the OSP structure with its fixed step."""
+    return _structure(folder / "OspSystemStructure.xml", "BaseStepSize", step, end)
+
+
+def ecco_file(folder: Path, step: float, end: float) -> Rows:
+    """libcosim on the OSP structure for ECCO: one power bond."""
+    return _structure(folder / "OspSystemStructure_ecco.xml", "StepSize", step, end)
 
 
 def ecco(folder: Path, step: float, end: float) -> Rows:
-    """The bond's six products of effort and flow as power bonds; the step follows from their residual."""
+    """libcosim's ECCO with all six products of effort and flow as power bonds."""
     from libcosimpy.CosimAlgorithm import CosimAlgorithm, EccoParams
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimSlave import CosimLocalSlave
 
-    parameters = EccoParams(
-        step_size=step, min_step_size=step / 10, max_step_size=0.1, min_change_rate=0.2, max_change_rate=1.5, abs_tolerance=1.0,
-        rel_tolerance=1e-3,
-    )  # fmt: skip
-    algorithm = CosimAlgorithm.create_ecco_algorithm(parameters)
+    given = dict(re.findall(r"<(\w+)>([0-9.e-]+)<", (folder / "OspSystemStructure_ecco.xml").read_text()))
+    names = {"safety_factor": "SafetyFactor", "min_step_size": "MinimumStepSize", "max_step_size": "MaximumStepSize",
+             "min_change_rate": "MinimumChangeRate", "max_change_rate": "MaximumChangeRate", "p_gain": "ProportionalGain",
+             "i_gain": "IntegralGain", "abs_tolerance": "AbsoluteTolerance", "rel_tolerance": "RelativeTolerance"}  # fmt: skip
+    algorithm = CosimAlgorithm.create_ecco_algorithm(EccoParams(step_size=step, **{key: float(given[it]) for key, it in names.items()}))
     execution = CosimExecution.from_algorithm(algorithm)
     pipe, vessel = (execution.add_local_slave(CosimLocalSlave(f"{folder}/{name}.fmu", name)) for name in ("pipe", "vessel"))
     references = _references(execution)
@@ -54,7 +84,7 @@ def ecco(folder: Path, step: float, end: float) -> Rows:
 
 
 def ecos(folder: Path, step: float, end: float) -> Rows:
-    """The SSP file."""
+    """Ecos on the SSP file."""
     from ecospy import EcosSimulation
 
     with EcosSimulation(ssp_path=str(folder / "system.ssp"), step_size=step) as simulation:
@@ -62,6 +92,35 @@ def ecos(folder: Path, step: float, end: float) -> Rows:
         while simulation.get_time() < end - 0.5 * step:
             simulation.step(1)
             yield [simulation.get_time(), *(simulation.get_real(f"{unit}::{name}") for unit, name in WATCHED)]
+
+
+def cofmupy(folder: Path, step: float, end: float) -> Rows:
+    """CoFmuPy on the FMUs (Jacobi); its inputs start at zero, so the pipe's pull at rest is given to the vessel as initial values."""
+    import fmpy
+    from cofmupy import Coordinator
+
+    wires = [(f"{out}[{i}]", f"{held}[{i}]", f"{effort}[{i}]") for out, held, effort in BOND for i in "123"]
+    pulls = [effort for _, _, effort in wires]
+    rest = fmpy.simulate_fmu(str(folder / "pipe.fmu"), stop_time=1e-3, output_interval=1e-3, output=pulls)[0]
+    connections = [("vessel", out, "pipe", held) for out, held, _ in wires] + [("pipe", pull, "vessel", pull) for pull in pulls]
+    fmus = [{"id": name, "path": f"{folder}/{name}.fmu", "initialization": {}} for name in ("pipe", "vessel")]
+    fmus[1]["initialization"] = {pull: float(rest[pull]) for pull in pulls}
+    coordinator = Coordinator()
+    coordinator.start({
+        "fmus": fmus,
+        "connections": [{"source": {"id": a, "variable": b}, "target": {"id": c, "variable": d}} for a, b, c, d in connections],
+    })  # fmt: skip
+    for _ in range(round(end / step)):
+        coordinator.do_step(step)
+        yield [coordinator.master.current_time, *(float(coordinator.get_variable(place)[0]) for place in WATCHED)]
+
+
+def _structure(path: Path, element: str, step: float, end: float) -> Rows:
+    """libcosim on an OSP structure, whose first `element` is set to `step`."""
+    from libcosimpy.CosimExecution import CosimExecution
+
+    path.write_text(re.sub(f"<{element}>.*?<", f"<{element}>{step}<", path.read_text(), count=1))
+    return _march(CosimExecution.from_osp_config_file(osp_path=str(path)), end)
 
 
 def _march(execution: Any, end: float) -> Rows:
@@ -93,4 +152,4 @@ def _text(name: Any) -> str:
 if __name__ == "__main__":
     with open(sys.argv[5], "w", encoding="utf-8") as result:
         for row in globals()[sys.argv[1]](Path(sys.argv[2]), float(sys.argv[3]), float(sys.argv[4])):
-            result.write(json.dumps(row) + "\n")
+            result.write(json.dumps([float(value) for value in row]) + "\n")

@@ -17,7 +17,8 @@ from master.ledger import EnergyCheckFailed
 from master.prepared import prepare
 
 EXPORTED = (
-    "pipe.fmu", "vessel.fmu", "system.ssp", "OspSystemStructure.xml", "Pipe_OspModelDescription.xml", "Vessel_OspModelDescription.xml",
+    "pipe.fmu", "vessel.fmu", "system.ssp", "OspSystemStructure.xml", "OspSystemStructure_ecco.xml", "Pipe_OspModelDescription.xml",
+    "Vessel_OspModelDescription.xml",
 )  # fmt: skip
 ROUND_OFF = 1e-12  # of the largest term of the energy
 BUSY = ["environment.current.start=0", "environment.current.ramp=4", "vessel.controller.start=2", "simulation.snapshots=[]"]
