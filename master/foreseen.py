@@ -13,6 +13,7 @@ short, since nothing is known yet.
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ from .step import CouplingFailed, End
 
 MEMORY = 0.5  # per step: how fast a foresight's past failure is forgotten
 
+FIT = 0.9  # per step: weight of the past in the measured slope
+REGULAR = 1e-6  # of the data: below it a direction counts as not seen
+
 
 class Foreseen:
     """A mobility end by its law; `take` solves the end itself, for good. Nothing need be foreseen of an end that can roll back."""
@@ -34,7 +38,8 @@ class Foreseen:
         self.end = end
         flow, self._scale = end.result(), bond.flow_increments()
         self._velocity, self._time, self._step = flow, 0.0, 0.0
-        self._seen: tuple[Vector, Vector] | None = None  # effort and acceleration of the last step, for `_measured`
+        self._squares = self._products = np.zeros((bond.size, bond.size))  # of changes of the effort, of those with accelerations
+        self._seen: deque[tuple[Vector, Vector]] = deque(maxlen=3)  # accelerations and efforts of the last steps
         self._slope = np.zeros((bond.size, bond.size))  # Y over the length of its step
         self._plain = Extrapolation(flow, flow, self._size)
         self._inert = Extrapolation(np.zeros(bond.size), np.zeros(bond.size), self._size)
@@ -112,21 +117,25 @@ class Foreseen:
         self.end.cancel()
 
     def _measured(self, acceleration: Vector, effort: Vector) -> Matrix:
-        """The least change of the slope that explains the last two steps, symmetric and not negative; in units of the flows that count."""
-        scale, seen = self._scale, self._seen
-        self._seen = effort, acceleration
-        if seen is None:
+        """The slope that best explains the changes of acceleration by those of the effort, symmetric and not negative.
+
+        Directions in which the effort has not changed have the slope of those in which it has. In units of the flows that count.
+        """
+        answer, cause = acceleration / self._scale, effort * self._scale
+        self._seen.append((answer, cause))
+        if len(self._seen) < 3:
             return self._slope
-        slope = self._slope / np.outer(scale, scale)
-        change, answer = (effort - seen[0]) * scale, (acceleration - seen[1]) / scale
-        size = float(change @ change)
+        change, of = (self._seen[0][k] - 2.0 * self._seen[1][k] + self._seen[2][k] for k in (0, 1))
+        self._squares = FIT * self._squares + np.outer(of, of)
+        self._products = FIT * self._products + np.outer(change, of)
+        size = float(np.trace(self._squares))
         if size == 0.0:
             return self._slope
-        missed = answer - slope @ change
-        update = np.outer(missed, change) / size
-        slope = slope + update + update.T - np.outer(change, change) * float(missed @ change) / size**2  # Powell's symmetric form
-        values, vectors = np.linalg.eigh(slope)
-        return np.outer(scale, scale) * (vectors * np.maximum(values, 0.0) @ vectors.T)
+        mean = max(float(np.trace(self._products)) / size, 0.0) * np.eye(len(of))
+        ridge = REGULAR * size * np.eye(len(of))
+        slope = mean + np.linalg.solve(self._squares + ridge, (self._products - mean @ self._squares).T).T
+        values, vectors = np.linalg.eigh((slope + slope.T) / 2)
+        return np.outer(self._scale, self._scale) * (vectors * np.maximum(values, 0.0) @ vectors.T)
 
     def _size(self, error: Vector) -> Any:
         """Of an error of the flow, or of every row of several."""
