@@ -3,7 +3,8 @@
 The body takes the vessel's place at the clamped top of a 1200 m pipe. A constant force and moment hold the static pull; a force along
 the pull and a moment shake it. Both have a part in proportion to the pull, which moves a light body against the pipe, and one
 in proportion to the body's mass, which gives a heavy body a motion of some metres and a tenth of a radian at the period of the sea.
-Taut: the pull, mean over a step, stays above 0.7 of that at rest; slack: it falls below 0.15 of it; snapping: it rises above twice that as well.
+Taut: the pull, mean over a step, stays above 0.7 of that at rest; slack: it falls below 0.15 of it; snapping: it rises above
+twice that as well.
 """
 
 from __future__ import annotations
