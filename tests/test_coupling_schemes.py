@@ -209,7 +209,7 @@ def test_extrapolation_of_a_parabola_over_uneven_steps_is_exact():
 @pytest.mark.parametrize("spring", [{}, {"stiffness": 1e-3, "damping": 1.0}, {"inertia": 1.0}, {"inertia": 1.0, "damping": 0.3}])
 def test_one_solve_each_without_rollback_does_not_grow_at_any_mass_ratio(files, spring, mass, step):
     body = {"mass": mass, "inertia": mass, "damping": 0.05, "stiffness": 0.1, "load": [0.3, 0.0, 0.0], **PUSH}
-    with tied(files, spring, body, step, rollback=False, action="warn") as pair:
+    with tied(files, spring, body, step, rollback=(False, False), action="warn") as pair:
         energies = []
         for i in range(300):
             pair.run_one(i * step, step)
@@ -222,7 +222,7 @@ def test_one_solve_each_without_rollback_does_not_grow_at_any_mass_ratio(files, 
 
 def test_one_solve_each_leaves_a_residual_that_is_measured_and_falls_with_the_step(files):
     def left(step):
-        with tied(files, {"hardening": 2.0}, {**PUSH, "damping": 0.1}, step, rollback=False, action="warn") as pair:
+        with tied(files, {"hardening": 2.0}, {**PUSH, "damping": 0.1}, step, rollback=(False, False), action="warn") as pair:
             pair.run(step, 10.0)
             ledger = pair.ledger
             assert abs(ledger.closure) == pytest.approx(abs(pair.spring.get("top_work")[0] + pair.body.get("bond_work")[0]), rel=1e-9)

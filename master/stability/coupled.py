@@ -60,7 +60,14 @@ def scalar_bond() -> Bond:
 
 @contextmanager
 def paired(
-    impedance: Half, mobility: Half, bond: Bond, scheme: str, step: float, tolerance: float = 1e-9, start: float = 0.0
+    impedance: Half,
+    mobility: Half,
+    bond: Bond,
+    scheme: str,
+    step: float,
+    tolerance: float = 1e-9,
+    start: float = 0.0,
+    rollback: bool = True,
 ) -> Iterator[Pairing]:
     """Both FMUs initialised, coupled with macro steps of `step` [s]; the ledger warns at most. Raises FmuFailed."""
     with Fmu(impedance.file, "impedance") as a, Fmu(mobility.file, "mobility") as b:
@@ -68,7 +75,7 @@ def paired(
         b.initialize(mobility.parameters, start)
         ledger = Ledger([(a, impedance.columns), (b, mobility.columns)], action="warn")
         if scheme == "energy-consistent":
-            ends = impedance_end(a, bond), mobility_end(b, bond)
+            ends = impedance_end(a, bond, rollback=rollback), mobility_end(b, bond, rollback=rollback)
         else:
             ends = FmuEnd(a, bond.flows, impedance.ends), FmuEnd(b, bond.efforts, mobility.ends)
         yield Pairing(a, b, coupling(scheme, *ends, bond, step, tolerance, ledger.check), ledger, start)

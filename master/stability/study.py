@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import multiprocessing
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -39,20 +39,26 @@ def study(names: Sequence[str], folder: Path, stream: TextIO) -> tuple[str, bool
         lines += [f"  {x.scheme:18} {x.found:32} theory: {x.theory:15} {_verdict(x.holds)}" for x in found] + [""]
         kept += [limit.holds for limit in found]
     if "bodies" in wanted:
-        outcomes = run_bodies(bodies.cases(), cache, stream)
-        _write(folder / "bodies.csv", [{**asdict(o), "holds": o.holds} for o in outcomes])
+        outcomes = run_bodies(bodies.cases(), cache, stream, folder / "bodies.csv")
         lines += ["The pipe and a rigid body, 60 s", _bodies_table(outcomes)]
         kept += [o.holds for o in outcomes if o.scheme == "energy-consistent"]
     return "\n".join(lines).rstrip(), all(kept)
 
 
-def run_bodies(cases: Sequence[bodies.Case], cache: Path, stream: TextIO) -> list[bodies.Outcome]:
-    """The outcomes of `cases`, on two processes."""
-    with multiprocessing.get_context("spawn").Pool(WORKERS) as pool:
+def run_bodies(cases: Sequence[bodies.Case], cache: Path, stream: TextIO, path: Path) -> list[bodies.Outcome]:
+    """The outcomes of `cases`, on two processes; each is written to `path` as it is known."""
+    outcomes = []
+    with path.open("w", newline="", encoding="utf-8") as file, multiprocessing.get_context("spawn").Pool(WORKERS) as pool:
         still = pool.apply(rest, (cache,))
         jobs = [(case, still) for case in cases]
         done = tqdm(pool.imap(_run, jobs), total=len(jobs), file=stream, disable=not stream.isatty(), leave=False, unit="run")
-        return list(done)
+        writer = csv.DictWriter(file, [*(field.name for field in fields(bodies.Outcome)), "holds"])
+        writer.writeheader()
+        for outcome in done:
+            writer.writerow({**asdict(outcome), "holds": outcome.holds})
+            file.flush()
+            outcomes.append(outcome)
+    return outcomes
 
 
 def rest(cache: Path) -> bodies.Rest:
@@ -93,15 +99,21 @@ def _bodies_table(outcomes: Sequence[bodies.Outcome]) -> str:
         other = others.get((scheme, o.state, o.mass_kg, o.step_s))
         return "-" if other is None else f"{other.residual:.0e}" if other.finished else f"ends {other.end_s:.1f} s"
 
+    labels = dict.fromkeys(o.scheme for o in outcomes)
+    through = {label: sum(o.finished for o in outcomes if o.scheme == label) for label in labels}
+
     head = (
         f"  {'state':9} {'mass kg':>8} {'step s':>6} {'residual':>9} {'gap m':>8} {'solves':>6} {'most':>4} {'cut':>4} "
-        f"{'pull kN':>13} {'serial':>12} {'parallel':>12}"
+        f"{'pull kN':>13} {'no rollback':>12} {'serial':>12} {'parallel':>12}"
     )
     rows = [
         f"  {o.state:9} {o.mass_kg:8.0e} {o.step_s:6g} {o.residual:9.1e} {o.gap_m:8.0e} {o.solves:6.1f} {o.most_solves:4d} {o.rejected:4d} "
-        f"{o.least_pull:5.0f} to {o.largest_pull:5.0f} {ended('serial', o):>12} {ended('parallel', o):>12} "
+        f"{o.least_pull:5.0f} to {o.largest_pull:5.0f} "
+        f"{ended('without rollback', o):>12} {ended('serial', o):>12} {ended('parallel', o):>12} "
         f"{_verdict(o.holds)} {o.message}"
         for o in outcomes
         if o.scheme == "energy-consistent"
     ]
-    return "\n".join([head, *rows])
+    count = len(outcomes) // len(labels)
+    end = f"  run to the end, of {count}: " + ", ".join(f"{label} {number}" for label, number in through.items())
+    return "\n".join([head, *rows, end])

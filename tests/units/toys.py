@@ -72,9 +72,10 @@ def tied(
     action: Action = "stop",
     tolerance: float = 1e-10,
     checked: bool = True,
-    rollback: bool = True,
+    rollback: tuple[bool, bool] = (True, True),
 ) -> Iterator[Pair]:
-    """Spring and body FMU, initialised and coupled; `by_port` False leaves the master to difference quotients."""
+    """Spring and body FMU, initialised and coupled; `by_port` False leaves the master to difference quotients,
+    `rollback` says which of the two can."""
     with Fmu(files[0], "spring") as a, Fmu(files[1], "body") as b:
         a.initialize(spring)
         b.initialize(body)
@@ -85,8 +86,8 @@ def tied(
         yield Pair(a, b, coupling(scheme, *ends, bond, step, tolerance, check), ledger)
 
 
-def _ends(a: Fmu, b: Fmu, bond: Bond, scheme: str, by_port: bool, rollback: bool) -> tuple[FmuEnd, FmuEnd]:
+def _ends(a: Fmu, b: Fmu, bond: Bond, scheme: str, by_port: bool, rollback: tuple[bool, bool]) -> tuple[FmuEnd, FmuEnd]:
     if scheme == "energy-consistent":
         named = ("impedance", "mobility") if by_port else (None, None)
-        return impedance_end(a, bond, named[0], rollback), mobility_end(b, bond, named[1], rollback)
+        return impedance_end(a, bond, named[0], rollback[0]), mobility_end(b, bond, named[1], rollback[1])
     return end_value_ends(a, b, bond)
