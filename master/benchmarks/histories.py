@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from master.hard_cases import Motion
+if TYPE_CHECKING:
+    from master.hard_cases import Motion
 
 SAMPLE = 0.4  # s between the instants compared
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Contestant, elements, step [s] (of a variable step: its relative tolerance) and kind of mesh of one run, and how often it is timed."""
+    """Contestant, elements, step [s] (of a variable step: its tolerance) and kind of mesh of one run, and how often it is timed."""
 
     contestant: str
     elements: int

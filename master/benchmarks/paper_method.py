@@ -22,7 +22,6 @@ from master.errors import RunError
 from pipe_fmu import Pipe, PipeParameters
 from pipe_fmu.compiled import kernel
 
-_ABSOLUTE = 1e-6  # ode15s's default
 _STEADY = 1e-9  # of the line's weight: residual of the static shape
 _DIFFERENCE = 1e-3  # s for the velocity and acceleration of the prescribed top
 
@@ -161,7 +160,7 @@ class Model:
 
 
 def run(parameters: PipeParameters, case: LineCase, setting: Setting) -> tuple[float, Histories]:
-    """CPU time [s] of the integration and the histories; `step_s` is the relative tolerance. Raises RunError where it breaks down."""
+    """CPU time [s] of the integration and the histories; `step_s` is the tolerance, relative and absolute. Raises RunError where it breaks down."""
     model, motion, eps = Model(parameters, setting.elements), case.motion, _DIFFERENCE
     start = np.hstack([model.rest, np.zeros((model.n, 6))]).ravel()
 
@@ -173,7 +172,7 @@ def run(parameters: PipeParameters, case: LineCase, setting: Setting) -> tuple[f
     times = instants(case.duration)
     rates(0.0, start)
     begin = time.process_time()
-    found = solve_ivp(rates, (0.0, times[-1]), start, "BDF", times, rtol=setting.step_s, atol=_ABSOLUTE, jac_sparsity=pattern)
+    found = solve_ivp(rates, (0.0, times[-1]), start, "BDF", times, rtol=setting.step_s, atol=setting.step_s, jac_sparsity=pattern)
     spent = time.process_time() - begin
     if not found.success:
         raise RunError(f"the paper's method with {setting.elements} elements stopped at {found.t[-1]:g} s: {found.message}")
