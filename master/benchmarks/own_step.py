@@ -27,7 +27,7 @@ def run_fmu(parameters: PipeParameters, case: LineCase, setting: Setting) -> tup
     """As `run`, through the pipe's FMU in a process of its own; the nodes must be those of the step in-process. Raises RunError."""
     changes = (f"pipe.nodes={setting.elements + 1}", f"pipe.mesh='{setting.mesh}'", f"simulation.macro_step={setting.step_s!r}")
     found = apart(march, "heave", [*case.changes, *changes], instants(case.duration), [("pipe", "node_position")])
-    spent, nodes = found[1], found[2][0].reshape(-1, setting.elements + 1, 3)
+    spent, nodes = found[0], found[1][0].reshape(-1, setting.elements + 1, 3)
     _, pipe, kept, top = _march(parameters, case, setting)
     gap = float(np.abs(np.array([state.position for state in kept]) - nodes).max())
     if gap > _SAME:

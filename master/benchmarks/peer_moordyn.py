@@ -19,7 +19,7 @@ from master.benchmarks.histories import SAMPLE, Histories, LineCase, Setting, in
 from pipe_fmu import PipeParameters
 
 SETTLING = 300.0  # s
-_COUPLING = 0.1  # s over which the motion of the top is a straight line
+_COUPLING = 0.025  # s over which the motion of the top is a straight line
 _TURN = np.array([1.0, -1.0, -1.0])  # from z down to z up
 
 _FILE = """MoorDyn input
