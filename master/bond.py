@@ -147,9 +147,9 @@ class FmuEnd:
         self.fmu, self._held, self._result, self._sign = fmu, _several(held), _several(result), sign
         self._mean, self._signs = self._result if mean is None else mean, signs
         self._derivative = derivative if derivative in fmu.ports else None
+        self.yields = yielding in fmu.ports and all(name in fmu.ports for name in met)
+        self._yielding, self._met = (yielding, (*self._result, *met)) if self.yields else ("", ())
         self.rollback = rollback and fmu.can_rollback
-        yields = self.rollback and yielding in fmu.ports and all(name in fmu.ports for name in met)
-        self._yielding, self._met = ((*self._held, yielding), (*self._result, *met)) if yields else ((), ())
         self._saved: ctypes.c_void_p | None = None
         self._moved = False
         self.solves = 0
@@ -169,12 +169,16 @@ class FmuEnd:
     def meet(self, time: float, step: float, free: Vector, mobility: Matrix) -> tuple[Vector, Vector] | None:
         """Step with a flow V that meets V = free + mobility x answer; V and answer, which belong together. None if the FMU cannot.
 
-        The next `solve` holds what it is given: the saved state that it goes back to has the mobility zero. Raises as `solve`.
+        The next `solve` holds what it is given: the mobility is zero in the saved state that it goes back to, or set so. Raises as `solve`.
         """
         if not self._yielding:
             return None
-        self._step(time, step, self._yielding, np.concatenate([free, mobility.ravel()]))
-        values = self.fmu.get(self._met)
+        try:
+            self._step(time, step, (*self._held, self._yielding), np.concatenate([free, mobility.ravel()]))
+            values = self.fmu.get(self._met)
+        finally:
+            if self._saved is None:
+                self.fmu.set(self._yielding, np.zeros(mobility.size))
         if not np.isfinite(values).all():
             raise self._broken(time, step)
         return values[free.size :], self._signs * values[: free.size]

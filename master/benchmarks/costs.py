@@ -22,7 +22,6 @@ from pipe_fmu.environment import Environment
 
 STEPS, STEP_S, REPEATS = 200, 0.1, 7
 BASE = "drag in still water"
-LARGEST_WITHOUT = 1.05  # of the base: what a piece that is not named may cost
 
 
 def variants() -> dict[str, PipeParameters]:

@@ -1,8 +1,8 @@
 """The paper's scene: pipe and vessel through their FMUs and the master, and both solved together in-process (master.monolithic).
 
-Errors are root mean squares over the instants of force and moment on the pipe's top and of the vessel's position, against a finer monolithic
-run; its uncertainty is its distance from one with half the elements and twice the step. A share is an error over the largest change of its
-quantity since the start. Only the stepping is timed; every run has a process of its own, in turn.
+Errors are root mean squares over the instants of force and moment on the pipe's top and of the vessel's position, against a finer
+monolithic run; its uncertainty is its distance from one with half the elements and twice the step. A share is an error over the largest
+change of its quantity since the start. Only the stepping is timed; every run has a process of its own, in turn.
 """
 
 from __future__ import annotations

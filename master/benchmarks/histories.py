@@ -15,13 +15,16 @@ SAMPLE = 0.4  # s between the instants compared
 
 @dataclass(frozen=True)
 class Setting:
-    """Contestant, elements, step [s] (of a variable step: its tolerance) and kind of mesh of one run, and how often it is timed."""
+    """Contestant, elements, step [s] (of a variable step: its tolerance) and kind of mesh of one run; how often it is timed, and its
+    duration [s] where that is less than the case's.
+    """
 
     contestant: str
     elements: int
     step_s: float
     mesh: str = "uniform"
     repeats: int = 3
+    span: float | None = None
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,10 @@ class Histories:
     position: np.ndarray
     top_force: np.ndarray
     bending: np.ndarray
+
+    def until(self, count: int) -> Histories:
+        """The first `count` instants."""
+        return Histories(self.position[:count], self.top_force[:count], self.bending[:count])
 
     def distance(self, other: Histories) -> tuple[float, float, float]:
         """Root mean square differences in position [m], top force [N] and largest bending moment [N m]."""

@@ -1,9 +1,9 @@
 """The pipe alone with a heaving top: CPU time against error, of our step and of others on the same physics.
 
 Errors are distances from a converged run of ours, root mean squares over the common instants: position at L/4, L/2 and 3L/4, force at the
-top, largest bending moment. Where a contestant's force is the mean over a step, that at an instant is the mean of the steps before and after it. The reference's uncertainty is
-taken as its own distance from a run of ours with half the elements and twice the step, which is larger than it wherever the error at least
-halves with both.
+top, largest bending moment. Where a contestant's force is the mean over a step, that at an instant is the mean of the steps before and
+after it. The reference's uncertainty is taken as its own distance from a run of ours with half the elements and twice the step, which is
+larger than it wherever the error at least halves with both.
 """
 
 from __future__ import annotations
@@ -48,22 +48,23 @@ def _own(*pairs: tuple[int, float]) -> tuple[Setting, ...]:
 
 
 _OURS = (
-    *_own((16, 0.4), (24, 0.4), (24, 0.2), (32, 0.2), (32, 0.4 / 3), (40, 0.4 / 3), (48, 0.1), (64, 0.1), (64, 0.05), (96, 0.05)),
-    *(Setting(UNIFORM, n, h) for n, h in ((48, 0.1), (96, 0.05))),
+    *_own((12, 0.4), (16, 0.4), (24, 0.4), (24, 0.2), (32, 0.2), (40, 0.4 / 3), (48, 0.1), (64, 0.1), (64, 0.05), (96, 0.05)),
+    *(Setting(UNIFORM, n, h) for n, h in ((40, 0.2), (48, 0.4 / 3), (48, 0.1), (80, 0.05), (96, 0.05))),
     *(Setting(FMU, n, h, "adapted") for n, h in ((24, 0.2), (48, 0.1), (96, 0.05))),
 )
 _COARSE, _FINE = Setting(EXUDYN, 48, 0.1), Setting(EXUDYN, 96, 0.05)
 _LUMPED, _LUMPED_FINE = Setting(MOORDYN, 48, 0.00625), Setting(MOORDYN, 192, 0.00156, repeats=1)
-_PAPER = tuple(Setting(PAPER, n, tolerance, repeats=1) for n, tolerance in ((24, 1e-3), (48, 1e-3), (48, 1e-4)))
+_PAPER = tuple(Setting(PAPER, n, 1e-2, repeats=1) for n in (24, 48, 96))
+_STUCK = Setting(PAPER, 24, 1e-3, repeats=1, span=48.0)  # from 40 s on its step falls below a millisecond
 _EXUDYN = (Setting(EXUDYN, 24, 0.2), Setting(EXUDYN, 48, 0.2), _COARSE, _FINE, Setting(BARE, 48, 0.1))
 _SHEAR = f"pipe.section.shear_stiffness={PIPE.section.stiffness[1]!r}"
 CASES = {
     "heave": LineCase(
-        swing(2.0, 12.0), 300.0, (*_OURS, *_EXUDYN, _LUMPED, _LUMPED_FINE, *_PAPER),
+        swing(2.0, 12.0), 300.0, (*_OURS, *_EXUDYN, _LUMPED, _LUMPED_FINE, *_PAPER, _STUCK),
         Setting(OWN, 192, 0.025, "adapted"), Setting(OWN, 96, 0.05, "adapted"), (_SHEAR,),
     ),
     "snap": LineCase(
-        swing(6.0, 8.0), 60.0, (*_OURS, *_EXUDYN, _LUMPED, *_PAPER[:2]),
+        swing(6.0, 8.0), 60.0, (*_OURS, *_EXUDYN, _LUMPED, *_PAPER),
         Setting(OWN, 192, 0.0125, "adapted"), Setting(OWN, 96, 0.025, "adapted"),
         (_SHEAR, "top_motion.amplitude=[0.0,0.0,-6.0]", "top_motion.period=8.0", "top_motion.ramp=16.0"),
     ),
@@ -71,7 +72,7 @@ CASES = {
 RACES = {
     "heave": (
         Race(_COARSE, 3.0, 1e-3), Race(_FINE, 3.0, 2e-4), Race(_LUMPED, 10.0), Race(_LUMPED_FINE, 50.0),
-        *(Race(one, 100.0) for one in _PAPER),
+        *(Race(one, 100.0) for one in (*_PAPER, _STUCK)),
     ),
 }  # fmt: skip
 
@@ -94,7 +95,7 @@ def count(case: LineCase) -> int:
 
 def _run(case: LineCase, setting: Setting) -> tuple[float, Histories]:
     parameters = replace(PIPE, nodes=setting.elements + 1, mesh="uniform" if setting.mesh == "uniform" else "adapted")
-    return CONTESTANTS[setting.contestant][0](parameters, case, setting)
+    return CONTESTANTS[setting.contestant][0](parameters, replace(case, duration=setting.span or case.duration), setting)
 
 
 def sweep(case: LineCase, tick: Callable[[], object]) -> tuple[list[dict[str, Any]], tuple[float, float, float]]:
@@ -111,15 +112,17 @@ def sweep(case: LineCase, tick: Callable[[], object]) -> tuple[list[dict[str, An
             if turn < setting.repeats:
                 seconds, found = _run(case, setting)
                 spent[setting].append(seconds)
-                errors[setting] = found.distance(exact)
+                errors[setting] = found.distance(exact.until(len(found.position)))
                 tick()
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "contestant": s.contestant, "elements": s.elements, "step_s": s.step_s, "mesh": s.mesh, "repeats": s.repeats,
-            "cpu_s": statistics.median(spent[s]), **dict(zip(KEYS, errors[s], strict=True)),
+            "simulated_s": s.span or case.duration, "cpu_s": statistics.median(spent[s]), **dict(zip(KEYS, errors[s], strict=True)),
         }
         for s in wanted
     ]  # fmt: skip
+    for row in rows:
+        row["cpu_share"] = row["cpu_s"] / row["simulated_s"]
     return rows, uncertainty
 
 
@@ -131,11 +134,11 @@ def verdicts(name: str, rows: Sequence[dict[str, Any]]) -> list[tuple[str, float
         if theirs is None:
             continue
         error = theirs["position_rms_m"] if race.error is None else race.error
-        able = [row for row in rows if row["contestant"] == OWN and row["position_rms_m"] <= error]
-        best = min(able, key=lambda row: row["cpu_s"], default=None)
+        able = [row for row in rows if row["contestant"] in (OWN, UNIFORM) and row["position_rms_m"] <= error]
+        best = min(able, key=lambda row: row["cpu_share"], default=None)
         ours = f"ours at {error:.2g} m, {best['elements']} x {best['step_s']:.3g} s" if best else f"none of ours reaches {error:.2g} m"
         what = f"{race.against.contestant} {race.against.elements} x {race.against.step_s:g} ({theirs['position_rms_m']:.2g} m) over {ours}"
-        found.append((what, theirs["cpu_s"] / best["cpu_s"] if best else 0.0, race.factor))
+        found.append((what, theirs["cpu_share"] / best["cpu_share"] if best else 0.0, race.factor))
     return found
 
 

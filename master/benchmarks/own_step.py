@@ -66,33 +66,6 @@ def _histories(pipe: Pipe, kept: list[PipeState], top: np.ndarray, step: float) 
     return Histories(quarters, 0.5 * (top[at - 1] + top[at]), np.array(bending))
 
 
-def _histories(pipe: Pipe, kept: list[PipeState], top: np.ndarray, step: float) -> Histories:
-    every = round(SAMPLE / step)
-    at = every * np.arange(1, len(kept) + 1)
-    bending = [pipe.largest_bending_moment(pipe.section_forces(state)) for state in kept]
-    quarters = np.array([_quarters(pipe, state.position, state.quaternion) for state in kept])
-    return Histories(quarters, 0.5 * (top[at - 1] + top[at]), np.array(bending))
-
-
-def _march_fmu(case: LineCase, setting: Setting) -> tuple[float, np.ndarray]:
-    """CPU time [s] of the master's steps with the ledger's check, and the nodes (k, n, 3) [m] at the instants."""
-    from master import scene
-    from master.drive import open_drive
-    from master.prepared import prepare
-
-    changes = (f"pipe.nodes={setting.elements + 1}", f"pipe.mesh='{setting.mesh}'", f"simulation.macro_step={setting.step_s!r}")
-    loaded = scene.load("heave", [*case.changes, *changes, f"simulation.duration={case.duration!r}"])
-    nodes, spent = [], 0.0
-    with open_drive(loaded.sections, prepare(loaded)) as drive:
-        for t in instants(case.duration):
-            begin = time.process_time()
-            while drive.time < t - 1e-9:
-                drive.advance(case.duration)
-            spent += time.process_time() - begin
-            nodes.append(drive.units["pipe"].get("node_position").reshape(-1, 3))
-    return spent, np.array(nodes)
-
-
 def _quarters(pipe: Pipe, position: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
     """Positions (3, 3) at L/4, L/2 and 3L/4, by Hermite's cubic along the first axes of the sections."""
     along = np.array([np.array(matrix(tuple(q)))[:, 0] for q in quaternion])

@@ -155,12 +155,15 @@ class Model:
 
     def rates(self, y: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """dy/dt."""
-        found: np.ndarray = rates_of(y, self.n, self.h, self.mass, self.inertia, *self.loads, speed)
-        return found
+        stiffness, weight, across, along, current = self.loads
+        return np.asarray(rates_of(y, self.n, self.h, self.mass, self.inertia, stiffness, weight, across, along, current, speed))
 
 
 def run(parameters: PipeParameters, case: LineCase, setting: Setting) -> tuple[float, Histories]:
-    """CPU time [s] of the integration and the histories; `step_s` is the tolerance, relative and absolute. Raises RunError where it breaks down."""
+    """CPU time [s] of the integration and the histories; `step_s` is the tolerance, relative and absolute.
+
+    Raises RunError where it breaks down.
+    """
     model, motion, eps = Model(parameters, setting.elements), case.motion, _DIFFERENCE
     start = np.hstack([model.rest, np.zeros((model.n, 6))]).ravel()
 

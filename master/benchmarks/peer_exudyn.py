@@ -1,8 +1,8 @@
 """Contestant: Exudyn's ANCF cable (cubic, no shear, no torsion), generalised alpha with a fixed step and its modified Newton method.
 
 Exudyn has no drag. It is added as one object on all nodes whose generalised force is integrated in a compiled function, with three Gauss
-points an element; its derivative is left to the modified Newton method, which is faster than to supply it (measured). Newton's tolerance is
-the loosest that keeps the error; the compiled library without range checks is used. What that adds to a step is shown by a run without drag.
+points an element; its derivative is left to the modified Newton method, which is faster than to supply it (measured). Newton's tolerance
+is the loosest that keeps the error; the compiled library without range checks is used. A run without drag shows what the drag adds.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import math
 import sys
 import time
 from collections.abc import Sequence
+from importlib import import_module
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,8 +24,7 @@ from pipe_fmu.so3 import matrix
 
 _NEWTON = 1e-5  # relative tolerance; 1e-8, the default, takes half as long again and gives the same errors
 _SPECTRAL_RADIUS = 0.9  # Exudyn's default
-_LIST = tuple(zip(*np.polynomial.legendre.leggauss(3), strict=True))
-GAUSS = np.array([(0.5 * (x + 1.0), 0.5 * w) for x, w in _LIST])
+GAUSS = 0.5 * np.column_stack(np.polynomial.legendre.leggauss(3)) + [0.5, 0.0]  # points and weights on (0, 1)
 
 
 @kernel
@@ -64,7 +65,7 @@ def run(parameters: PipeParameters, case: LineCase, setting: Setting) -> tuple[f
     """
     sys.exudynFast = True  # type: ignore[attr-defined]
     import exudyn as exu
-    from exudyn import itemInterface as items
+    items = import_module("exudyn.itemInterface")
 
     mbs = exu.SystemContainer().AddSystem()
     nodes, start = _cable(mbs, items, parameters, setting, "without" not in setting.contestant)
@@ -82,7 +83,7 @@ def run(parameters: PipeParameters, case: LineCase, setting: Setting) -> tuple[f
     begin = time.process_time()
     mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.GeneralizedAlpha)
     spent = time.process_time() - begin
-    stored = [mbs.GetSensorStoredData(sensor)[1 : len(instants(case.duration)) + 1, 1:] for sensor in sensors]
+    stored = [np.asarray(mbs.GetSensorStoredData(sensor))[1 : len(instants(case.duration)) + 1, 1:] for sensor in sensors]
     shapes = np.stack(stored[: len(nodes)], axis=1) + start
     quarters = [k * setting.elements // 4 for k in (1, 2, 3)]
     force = -np.hstack(stored[len(nodes) :])
@@ -99,10 +100,11 @@ def _cable(mbs: Any, items: Any, parameters: PipeParameters, setting: Setting, d
     found, _ = Pipe(parameters).start(0.0)
     start = np.array([[*x, *np.array(matrix(tuple(q)))[:, 0]] for x, q in zip(found.position, found.quaternion, strict=True)])
     nodes = [mbs.AddNode(items.NodePointSlope1(referenceCoordinates=list(x))) for x in start]
-    for pair in zip(nodes[:-1], nodes[1:], strict=True):
+    for pair in pairwise(nodes):
         element = items.ObjectANCFCable(
-            length=length, massPerLength=mass, bendingStiffness=bending, axialStiffness=axial, nodeNumbers=list(pair), useReducedOrderIntegration=1
-        )
+            length=length, massPerLength=mass, bendingStiffness=bending, axialStiffness=axial,
+            nodeNumbers=list(pair), useReducedOrderIntegration=1,
+        )  # fmt: skip
         whole = mbs.AddMarker(items.MarkerBodyMass(bodyNumber=mbs.AddObject(element)))
         mbs.AddLoad(items.LoadMassProportional(markerNumber=whole, loadVector=[0.0, 0.0, weight / mass]))
     if drags:
@@ -121,8 +123,7 @@ def _add_drag(mbs: Any, items: Any, parameters: PipeParameters, nodes: list[Any]
     nothing.SetWithSparseMatrix(np.array([[0.0, 0.0, 1e-12]]), len(start), len(start))
 
     def force(mbs: Any, t: float, item: int, shape: Sequence[float], speed: Sequence[float]) -> np.ndarray:
-        result: np.ndarray = drag(start + np.array(shape), np.array(speed), length, *constants)
-        return result
+        return np.asarray(drag(start + np.array(shape), np.array(speed), length, *constants))
 
     def jacobian(*_: Any) -> Any:
         return nothing
@@ -169,10 +170,9 @@ def _settings(exu: Any, case: LineCase, setting: Setting) -> Any:
 
 def _largest_curvature(shapes: np.ndarray, length: float) -> np.ndarray:
     """Largest curvature (k,) [1/m] at the ends of the elements of `shapes` (k, n, 6), of the cubics between the nodes."""
-    (r, t), (r2, t2) = np.split(shapes[:, :-1], 2, axis=-1), np.split(shapes[:, 1:], 2, axis=-1)
+    r, t, r2, t2 = shapes[:, :-1, :3], shapes[:, :-1, 3:], shapes[:, 1:, :3], shapes[:, 1:, 3:]
     chord = (r2 - r) / length
     bends = np.concatenate([(6.0 * chord - 4.0 * t - 2.0 * t2) / length, (-6.0 * chord + 2.0 * t + 4.0 * t2) / length], axis=1)
     slopes = np.concatenate([t, t2], axis=1)
     curvature = np.linalg.norm(np.cross(slopes, bends), axis=-1) / np.linalg.norm(slopes, axis=-1) ** 3
-    largest: np.ndarray = curvature.max(axis=1)
-    return largest
+    return np.asarray(curvature.max(axis=1))

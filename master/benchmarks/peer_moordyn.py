@@ -1,7 +1,7 @@
 """Contestant: MoorDyn's lumped-mass line with bending stiffness (no torsion, no shear), Runge-Kutta 4.
 
-MoorDyn's axes are x forward, y to port, z up from the surface. Its own search for the start leaves the current out, so the line then rests for
-SETTLING seconds in the current before the clock starts. The foot is held by a fixed rod, which clamps the line along x.
+MoorDyn's axes are x forward, y to port, z up from the surface. Its own search for the start leaves the current out, so the line then rests
+for SETTLING seconds in the current before the clock starts. The foot is held by a fixed rod, which clamps the line along x.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def run(parameters: PipeParameters, case: LineCase, setting: Setting) -> tuple[f
             forces.append(force)
         moordyn.Close(system)
     count = len(instants(case.duration))
-    places = (np.array(positions) + [0.0, 0.0, depth]) * _TURN
+    places = _TURN * (np.array(positions) + np.array([0.0, 0.0, depth]))
     return spent, Histories(places[:count], -np.array(forces)[:count] * _TURN, np.full(count, np.nan))
 
 
