@@ -1,4 +1,4 @@
-"""The command `bench`: its tables, its errors against steps of known order, the contestants against the same static line, its exit codes."""
+"""The command `bench`: its tables, its errors against steps of known order, the contestants at rest on the same line, its exit codes."""
 
 import csv
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from master.__main__ import main
-from master.benchmarks import costs, line, paper_method, peer_exudyn, peer_moordyn, scaling, start, statics, study
+from master.benchmarks import costs, line, own_step, paper_method, peer_exudyn, peer_moordyn, scaling, start, statics, study
 from master.benchmarks.histories import LineCase, Setting
 from master.errors import RunError
 from master.hard_cases import swing
@@ -45,17 +45,18 @@ def test_a_race_compares_with_the_cheapest_of_ours_that_is_as_good_and_a_lost_on
     assert "NOT KEPT" in capsys.readouterr().out
     rows = [
         {"contestant": one, "elements": n, "step_s": 0.1, "position_rms_m": error, "cpu_share": cpu}
-        for one, n, error, cpu in (("step", 16, 2e-3, 1.0), ("step", 32, 1e-3, 2.0), ("step", 64, 1e-4, 4.0), (line.EXUDYN, 48, 1.2e-3, 8.0))
+        for one, n, error, cpu in (("step", 16, 2e-3, 1.0), ("step", 32, 1e-3, 2.0), ("step", 64, 1e-4, 4.0), (line.EXUDYN, 48, 1e-3, 8.0))
     ]
-    monkeypatch.setitem(line.RACES, "heave", (line.Race(Setting(line.EXUDYN, 48, 0.1), 3.0, 1e-3), line.Race(Setting(line.EXUDYN, 9, 0.1), 3.0)))
+    did, did_not = (line.Race(Setting(line.EXUDYN, n, 0.1), 3.0, 1e-3) for n in (48, 96))
+    monkeypatch.setitem(line.RACES, "heave", (did, did_not))
     assert [(found, least) for _, found, least in line.verdicts("heave", rows)] == [(4.0, 3.0)]
 
 
 def rest():
-    """Positions at the quarters and top force of the line at rest, on a fine mesh of ours (which the tests of statics hold against others)."""
+    """Positions at the quarters and top force of the line at rest, on a fine mesh of ours, which tests of statics hold against others."""
     pipe = Pipe(replace(line.PIPE, nodes=193))
     found, _ = pipe.start(0.0)
-    return np.array([np.interp(pipe.s[-1] * q, pipe.s, found.position[:, i]) for q in (0.25, 0.5, 0.75) for i in range(3)]), found.top[:3]
+    return own_step.quarters(pipe, found.position, found.quaternion).ravel(), found.top[:3]
 
 
 @pytest.mark.parametrize(("contestant", "setting", "metres", "share"), [
@@ -111,7 +112,9 @@ def test_statics_against_collocation_falls_with_the_fourth_power_of_the_elements
     exact = statics.run(parameters, statics.Setting(statics.COLLOCATION, tolerance=1e-8))[2]
     errors = [np.abs(statics.run(parameters, statics.Setting(statics.UNIFORM, n))[2] / exact - 1.0)[0] for n in (48, 96)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.7)
-    assert statics.run(parameters, statics.Setting(statics.ADAPTED, 192))[2] == pytest.approx(exact, rel=1e-6)
+    fine = statics.run(parameters, statics.Setting(statics.ADAPTED, 192))[2]
+    assert fine[0] == pytest.approx(exact[0], rel=1e-6)
+    assert fine[1:] == pytest.approx(exact[1:], abs=1e-6 * exact[1])  # the top hangs as it likes, and bends next to nothing
 
 
 def test_costs_names_every_optional_piece_and_each_can_be_stepped(monkeypatch):

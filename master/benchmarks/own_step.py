@@ -62,11 +62,11 @@ def _histories(pipe: Pipe, kept: list[PipeState], top: np.ndarray, step: float) 
     every = round(SAMPLE / step)
     at = every * np.arange(1, len(kept) + 1)
     bending = [pipe.largest_bending_moment(pipe.section_forces(state)) for state in kept]
-    quarters = np.array([_quarters(pipe, state.position, state.quaternion) for state in kept])
-    return Histories(quarters, 0.5 * (top[at - 1] + top[at]), np.array(bending))
+    places = np.array([quarters(pipe, state.position, state.quaternion) for state in kept])
+    return Histories(places, 0.5 * (top[at - 1] + top[at]), np.array(bending))
 
 
-def _quarters(pipe: Pipe, position: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
+def quarters(pipe: Pipe, position: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
     """Positions (3, 3) at L/4, L/2 and 3L/4, by Hermite's cubic along the first axes of the sections."""
     along = np.array([np.array(matrix(tuple(q)))[:, 0] for q in quaternion])
     curve = CubicHermiteSpline(pipe.s, position, along)

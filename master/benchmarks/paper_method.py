@@ -80,7 +80,7 @@ def forces(position, angles, velocity, h, stiffness, weight, across, along, curr
             moment[e + 1, i] += 0.5 * h * swept[i] - generalised[i]
     for k in range(n):
         share = h if 0 < k < n - 1 else 0.5 * h
-        tangent = rotation_and_rates(angles[k])[0][:, 0]
+        tangent = rotation_and_rates(angles[k])[0][:, 0].copy()
         relative = -velocity[k]
         relative[1] += current[1] * min(max(-position[k, 2] / current[0], 0.0), 1.0)
         forward = relative @ tangent
