@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from master.__main__ import main
-from master.benchmarks import costs, line, own_step, paper_method, peer_exudyn, peer_moordyn, scaling, start, statics, study
+from master.benchmarks import costs, coupled, line, own_step, paper_method, peer_exudyn, peer_moordyn, scaling, start, statics, study
 from master.benchmarks.histories import LineCase, Setting
 from master.errors import RunError
 from master.hard_cases import swing
@@ -115,6 +115,22 @@ def test_statics_against_collocation_falls_with_the_fourth_power_of_the_elements
     fine = statics.run(parameters, statics.Setting(statics.ADAPTED, 192))[2]
     assert fine[0] == pytest.approx(exact[0], rel=1e-6)
     assert fine[1:] == pytest.approx(exact[1:], abs=1e-6 * exact[1])  # the top hangs as it likes, and bends next to nothing
+
+
+def test_the_papers_scene_through_the_fmus_has_the_errors_of_both_solved_as_one(tmp_path, monkeypatch, capsys):
+    """With matched steps they are the same scheme; the explicit exchange, first order in the step, is not."""
+    settings = [coupled.Setting(one, 12, 0.5) for one in (coupled.CONSISTENT, coupled.MONOLITHIC, "serial")]
+    monkeypatch.setattr(coupled, "DURATION", 16.0)
+    monkeypatch.setattr(coupled, "OWN", settings[0])
+    monkeypatch.setattr(coupled, "SETTINGS", settings)
+    monkeypatch.setattr(coupled, "REFERENCE", coupled.Setting(coupled.MONOLITHIC, 12, 0.1))
+    monkeypatch.setattr(coupled, "CHECK", coupled.Setting(coupled.MONOLITHIC, 12, 0.2))
+    monkeypatch.setattr(coupled, "LARGEST_RATIO", 0.0)
+    assert main(["bench", "paper", "-o", str(tmp_path)]) == 1
+    assert "CPU time, FMUs and master over both solved as one" in capsys.readouterr().out
+    fmus, one, serial = (np.array([float(row[key]) for key in coupled.KEYS]) for row in table(tmp_path / "paper.csv"))
+    assert fmus == pytest.approx(one, rel=1e-3)
+    assert serial[2] > 2.0 * fmus[2]
 
 
 def test_costs_names_every_optional_piece_and_each_can_be_stepped(monkeypatch):
