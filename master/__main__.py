@@ -89,10 +89,10 @@ def parser() -> argparse.ArgumentParser:
     measured = command(
         "bench",
         commands.bench,
-        "Measure CPU time against error, and against the number of nodes.",
-        "files written: CASE.csv, and CASE.png for heave and snap; all of it takes several minutes",
+        "Measure CPU time against error, beside other codes; costs of nodes, of physics and of the start.",
+        "files written: CASE.csv, and CASE.png where error is measured; all of it takes half an hour",
     )
-    _study_arguments(measured, "heave, snap, nodes")
+    _study_arguments(measured, "heave, snap, paper, statics, costs, nodes, start")
     return top
 
 

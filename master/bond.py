@@ -106,9 +106,9 @@ class Bond:
     def _floors(self) -> Vector:
         return np.array([pair.floor for pair in self.pairs])
 
-    def idle_power(self, effort: Vector) -> float:
-        """Sum over the pairs of |effort| x floor [W]: the power that counts as nothing."""
-        return float(np.sqrt(np.add.reduceat(effort * effort, self._starts)) @ self._floors)
+    def idle_power(self, effort: Vector) -> Any:
+        """Sum over the pairs of |effort| x floor [W]: the power that counts as nothing; of every row (size,) of `effort`."""
+        return np.sqrt(np.add.reduceat(effort * effort, self._starts, axis=-1)) @ self._floors
 
     def flow_increments(self) -> Vector:
         """Increments of the flows for difference quotients, (size,)."""
@@ -144,11 +144,11 @@ class FmuEnd:
         yielding: str = "",
         met: tuple[str, ...] = (),
     ) -> None:
-        self.fmu, self._held, self._result, self._sign = fmu, held, result, sign
-        self._mean, self._signs = result if mean is None else mean, signs
+        self.fmu, self._held, self._result, self._sign = fmu, _several(held), _several(result), sign
+        self._mean, self._signs = self._result if mean is None else mean, signs
         self._derivative = derivative if derivative in fmu.ports else None
-        self._yielding = yielding if yielding in fmu.ports and all(name in fmu.ports for name in met) else ""
-        self._met, self.yields = met, bool(self._yielding)
+        self.yields = yielding in fmu.ports and all(name in fmu.ports for name in met)
+        self._yielding, self._met = (yielding, (*self._result, *met)) if self.yields else ("", ())
         self.rollback = rollback and fmu.can_rollback
         self._saved: ctypes.c_void_p | None = None
         self._moved = False
@@ -160,30 +160,39 @@ class FmuEnd:
 
     def solve(self, time: float, step: float, held: Vector) -> Vector:
         """Step from `time` with `held` on the ports; the conjugate ports. Raises StepRejected, FmuFailed."""
-        if self._saved is not None and self._moved:
-            self.fmu.restore(self._saved)
-        self._moved = True
-        self.solves += 1
-        self.fmu.set(self._held, held)
-        self.fmu.step(time, step, final=self._saved is None)
+        self._step(time, step, self._held, held)
         result = self.result()
         if not np.isfinite(result).all():
-            raise StepFailed(f"{self.fmu.name}: step of {step:.6g} s at {time:.9g} s: answers with a number that is not finite")
+            raise self._broken(time, step)
         return result
 
     def meet(self, time: float, step: float, free: Vector, mobility: Matrix) -> tuple[Vector, Vector] | None:
         """Step with a flow V that meets V = free + mobility x answer; V and answer, which belong together. None if the FMU cannot.
 
-        Raises as `solve`.
+        The next `solve` holds what it is given: the mobility is zero in the saved state that it goes back to, or set so. Raises as `solve`.
         """
         if not self._yielding:
             return None
-        self.fmu.set(self._yielding, mobility.ravel())
         try:
-            answer = self.solve(time, step, free)
+            self._step(time, step, (*self._held, self._yielding), np.concatenate([free, mobility.ravel()]))
+            values = self.fmu.get(self._met)
         finally:
-            self.fmu.set(self._yielding, np.zeros(mobility.size))
-        return self.fmu.get(self._met), answer
+            if self._saved is None:
+                self.fmu.set(self._yielding, np.zeros(mobility.size))
+        if not np.isfinite(values).all():
+            raise self._broken(time, step)
+        return values[free.size :], self._signs * values[: free.size]
+
+    def _step(self, time: float, step: float, ports: tuple[str, ...], values: Vector) -> None:
+        if self._saved is not None and self._moved:
+            self.fmu.restore(self._saved)
+        self._moved = True
+        self.solves += 1
+        self.fmu.set(ports, values)
+        self.fmu.step(time, step, final=self._saved is None)
+
+    def _broken(self, time: float, step: float) -> StepFailed:
+        return StepFailed(f"{self.fmu.name}: step of {step:.6g} s at {time:.9g} s: answers with a number that is not finite")
 
     def result(self) -> Vector:
         """The conjugate ports as they are."""
@@ -211,6 +220,10 @@ class FmuEnd:
         if self._saved is not None:
             self.fmu.restore(self._saved)
             self.commit()
+
+
+def _several(names: Names) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else names
 
 
 def impedance_end(

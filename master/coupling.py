@@ -13,10 +13,10 @@ Z and Y follow the ends' ports, where there are such, which makes the iteration 
 and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap.
 
 An impedance end that can yield (see `master.bond.FmuEnd.meet`) takes V_free and Y and solves for V and f at once, within its own
-Newton iteration. That replaces the extrapolated pair, and is exact where the mobility end is linear; V_free and Y are then taken
-anew at the f found. One more solve, with the V that the mobility end answers, confirms it. Otherwise the second round is exact where f
-is linear in V. Either way two solves of the
-impedance end make a step; without yielding one does where nothing happens, and more where the extrapolation fails.
+Newton iteration. That replaces the extrapolated pair, and is exact where the mobility end is linear; where that end answers f with
+another V, V_free and Y are taken anew at the f found. One more solve, with the V that the mobility end answers, confirms it. Without
+yielding the second round is exact where f is linear in V. Either way two solves of the impedance end make a step; without yielding
+one does where nothing happens, and more where the extrapolation fails.
 
 A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
 few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. A tolerance below
@@ -43,6 +43,7 @@ DIFFERENCES_ROUNDS = (4, 8)  # rounds after which Z is taken by differences: wit
 LAST_ROUND = 12
 FALLING = 0.3  # of the defect of the round before: more is no progress
 ROUND_OFF = 1e-10  # of the product of the magnitudes: without progress below this the ends' own round-off is reached
+FORESEEN = 0.1  # of the tolerance: a defect this small needs no better effort before it is confirmed
 EASY = 3  # rounds of an easy step
 PATIENCE = 4  # easy steps in a row after which a halved step grows
 FIRST_STEP = 2.0**-10  # of the macro step, where one end is foreseen
@@ -113,25 +114,27 @@ class EnergyConsistent:
             mobility = self.mobility.derivative()
             self._set_mobility(self._differences(self.mobility, time, step, effort, free) if mobility is None else mobility)
         free = free - self._Y @ effort
-        met = self.impedance.meet(time, step, free, self._Y)
+        met, foreseen = self.impedance.meet(time, step, free, self._Y), False
         if met is not None:
             flow, effort = met
-            free = self.mobility.solve(time, step, effort)
-            if (mobility := self.mobility.derivative()) is not None:
+            new_flow = self.mobility.solve(time, step, effort)
+            foreseen = not fresh and self._agree(flow, effort, new_flow)
+            if not foreseen and (mobility := self.mobility.derivative()) is not None:
                 self._set_mobility(mobility)
-            free = free - self._Y @ effort
+            free = new_flow - self._Y @ effort
         elif fresh:
             effort = self.impedance.solve(time, step, flow)
         on_law = fresh or met is not None
-        if on_law:
+        if on_law and not foreseen:
             slope = self.impedance.derivative()
             self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
             self._length = step
         self._converged, believed, before = False, True, np.inf
         for rounds in range(1, LAST_ROUND + 1):
-            Z, Y = self._Z, self._Y
-            held = np.linalg.solve(self._one + Z @ Y, effort + Z @ (flow - free))
-            new_flow = self.mobility.solve(time, step, held)
+            Z, Y, held = self._Z, self._Y, effort
+            if not (foreseen and rounds == 1):
+                held = np.linalg.solve(self._one + Z @ Y, effort + Z @ (flow - free))
+                new_flow = self.mobility.solve(time, step, held)
             new_effort = self.impedance.solve(time, step, new_flow)
             gap = held - new_effort
             trial = Step(time, step, new_flow, new_effort, step * float(gap @ new_flow), rounds)
@@ -155,6 +158,12 @@ class EnergyConsistent:
                 self._set_mobility(mobility)
             flow, effort, free, on_law = new_flow, new_effort, new_flow - self._Y @ held, True
         return trial
+
+    def _agree(self, met: Vector, effort: Vector, answered: Vector) -> bool:
+        """Whether the mobility end answers an effort with the flow that the impedance end met, by the defect to be expected."""
+        gap = self._Z @ (met - answered)
+        defect = abs(float(gap @ answered)) + abs(float(gap @ self._Y @ gap))
+        return defect <= FORESEEN * self.tolerance * abs(float(effort @ answered))
 
     def _commit(self, trial: Step) -> Step:
         self.impedance.commit()

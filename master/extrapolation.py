@@ -7,16 +7,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .bond import Vector
+from .bond import Matrix, Vector
 
 HIGHEST_ORDER = 2
 MEMORY = 0.5  # per step: how fast an order's past failure is forgotten
 
 
 class Extrapolation:
-    """Means of flow and effort by the middle of their steps; `norm` measures an error of the effort."""
+    """Means of flow and effort by the middle of their steps; `norm` measures errors of the effort, (k, n) to (k,)."""
 
-    def __init__(self, flow: Vector, effort: Vector, norm: Callable[[Vector], float]) -> None:
+    def __init__(self, flow: Vector, effort: Vector, norm: Callable[[Matrix], Vector]) -> None:
         self._start = np.concatenate([flow, effort])
         self._n, self._norm = flow.size, norm
         self._nodes: deque[float] = deque(maxlen=HIGHEST_ORDER + 1)  # the latest first
@@ -35,8 +35,9 @@ class Extrapolation:
         """Take in an accepted step and judge the orders by it."""
         if self._nodes:
             weights = [self._weights(time, order) for order in range(len(self._nodes))]
-            for order, value in enumerate(np.array(weights) @ np.array(self._points)):
-                self._errors[order] = max(self._norm(effort - value[self._n :]), MEMORY * self._errors[order])
+            missed = effort - (np.array(weights) @ np.array(self._points))[:, self._n :]
+            for order, error in enumerate(self._norm(missed).tolist()):
+                self._errors[order] = max(error, MEMORY * self._errors[order])
         self._nodes.appendleft(time)
         self._points.appendleft(np.concatenate([flow, effort]))
 

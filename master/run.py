@@ -85,7 +85,7 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
 def _march(drive: Drive, recorder: Recorder, scene: Scene, stream: TextIO, patience: threading.Timer) -> Ending:
     """Step to the end, recording after every step; the first one may compile and ends the need for `patience`."""
     end = scene.sections.simulation.duration
-    recorder.sample(drive.time, _row(drive))
+    recorder.sample(drive.time, row(drive))
     with postponed() as interrupted, _progress(end, stream) as bar:
         while drive.time < end:
             before = drive.time
@@ -96,14 +96,14 @@ def _march(drive: Drive, recorder: Recorder, scene: Scene, stream: TextIO, patie
             except RunError as error:
                 return Ending("failed", str(error))
             patience.cancel()
-            recorder.sample(drive.time, _row(drive))
+            recorder.sample(drive.time, row(drive))
             bar.update(drive.time - before)
             if interrupted.is_set():
                 return Ending("interrupted", f"interrupted at {drive.time:g} s of {end:g} s")
     return Ending("completed")
 
 
-def _row(drive: Drive) -> dict[tuple[str, str], float]:
+def row(drive: Drive) -> dict[tuple[str, str], float]:
     """What is recorded beside the ports: the derived values and the ledger."""
     return drive.derived() | {(name, "J"): value for name, value in zip(drive.ledger.names, drive.ledger.row, strict=True)}
 

@@ -1,142 +1,146 @@
-"""The pipe alone with a heaving top: CPU time against error, for elements and steps, against a converged run of its own.
+"""The pipe alone with a heaving top: CPU time against error, of our step and of others on the same physics.
 
-Errors are root mean squares over the common instants: position at L/4, L/2 and 3L/4, force at the top, largest bending moment. The force
-at an instant is the mean of the steps before and after it. The reference's uncertainty is taken as its own distance from the finest run of
-the sweep on its kind of mesh, which is larger wherever the error at least halves with the spacing and the step.
+Errors are distances from a converged run of ours, root mean squares over the common instants: position at L/4, L/2 and 3L/4, force at the
+top, largest bending moment. Where a contestant's force is the mean over a step, that at an instant is the mean of the steps before and
+after it. The reference's uncertainty is taken as its own distance from a run of ours with half the elements and twice the step, which is
+larger than it wherever the error at least halves with both.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import statistics
-import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
-from scipy.interpolate import CubicHermiteSpline
+from master.benchmarks import own_step, paper_method, peer_exudyn, peer_moordyn
+from master.benchmarks.histories import Histories, LineCase, Setting
+from master.hard_cases import cases, swing
 
-from master.errors import RunError
-from master.figures import _figure
-from master.hard_cases import Motion, cases, swing
-from pipe_fmu import Pipe
-from pipe_fmu.so3 import matrix
-
-SAMPLE = 0.4  # s between the instants compared
-_PIPE = next(case.pipe for case in cases() if case.name == "snap, slack to taut")
-
-
-@dataclass(frozen=True)
-class Setting:
-    """Elements, step [s] and kind of mesh of one run."""
-
-    elements: int
-    step_s: float
-    mesh: str = "adapted"
-
-
-@dataclass(frozen=True)
-class LineCase:
-    """A motion of the top, the runs to compare (the finest last) and the run they are compared with."""
-
-    motion: Motion
-    duration: float
-    settings: tuple[Setting, ...]
-    reference: Setting
-    repeats: int = 3
-
-
-@dataclass(frozen=True)
-class Histories:
-    """What is compared, at the instants: position (k, 3, 3) [m], top force (k, 3) [N], largest bending moment (k,) [N m]."""
-
-    position: np.ndarray
-    top_force: np.ndarray
-    bending: np.ndarray
-
-    def distance(self, other: Histories) -> tuple[float, float, float]:
-        """Root mean square differences in position [m], top force [N] and largest bending moment [N m]."""
-        rows = (self.position - other.position, self.top_force - other.top_force, self.bending - other.bending)
-        position, force = (float(np.sqrt((row**2).sum(axis=-1).mean())) for row in rows[:2])
-        return position, force, float(np.sqrt((rows[2] ** 2).mean()))
-
-
-_SWEEP = (
-    *(Setting(n, h) for n, h in ((24, 0.4), (24, 0.2), (48, 0.2), (48, 0.1), (96, 0.1), (96, 0.05))),
-    *(Setting(n, h, "uniform") for n, h in ((48, 0.1), (96, 0.05))),
-)
-CASES = {
-    "heave": LineCase(swing(2.0, 12.0), 300.0, _SWEEP, Setting(192, 0.025)),
-    "snap": LineCase(swing(6.0, 8.0), 60.0, _SWEEP, Setting(192, 0.0125)),
+PIPE = replace(next(case.pipe for case in cases() if case.name == "snap, slack to taut"), nodes=49)
+OWN, UNIFORM, FMU = "step", "step, uniform mesh", "FMU and master"
+EXUDYN, BARE, MOORDYN, PAPER = "Exudyn ANCF", "Exudyn without drag", "MoorDyn RK4", "paper's method"
+CONTESTANTS = {
+    OWN: (own_step.run, ""),
+    UNIFORM: (own_step.run, ""),
+    FMU: (own_step.run_fmu, ""),
+    EXUDYN: (peer_exudyn.run, "exudyn"),
+    BARE: (peer_exudyn.run, "exudyn"),
+    MOORDYN: (peer_moordyn.run, "moordyn"),
+    PAPER: (paper_method.run, ""),
 }
+"""How each runs, and the package of the optional group `bench` that it needs."""
+KEYS = ("position_rms_m", "top_force_rms_N", "bending_rms_N_m")
 
 
-def run(case: LineCase, setting: Setting) -> tuple[float, Histories]:
-    """CPU time of the steps [s] (statics, compilation and evaluation outside the clock) and the histories. Raises RunError."""
-    pipe = Pipe(replace(_PIPE, nodes=setting.elements + 1, mesh="uniform" if setting.mesh == "uniform" else _PIPE.mesh))
-    found, state = pipe.start(0.0)
-    if not found.converged:
-        raise RunError(f"statics with {setting.elements} elements failed, residual {found.residual:.1e}")
-    h, still, motion = setting.step_s, np.zeros(3), case.motion
-    every = round(SAMPLE / h)
-    pipe.step(state, still, still, h)  # compiles what is not yet compiled
-    kept, forces = [], []
-    begin = time.process_time()
-    for k in range(round(case.duration / h)):
-        result = pipe.step(state._replace(time=k * h), (motion((k + 1) * h)[0] - motion(k * h)[0]) / h, still, h)
-        if not result.converged:
-            raise RunError(f"{setting.elements} elements, step {h:g} s: no convergence at {k * h:g} s, residual {result.residual:.1e}")
-        state = result.state
-        forces.append(result.top[:3])
-        if (k + 1) % every == 0:
-            kept.append(state)
-    spent = time.process_time() - begin
-    top = np.array(forces)
-    at = np.arange(every, len(top), every)
-    kept = kept[: len(at)]
-    bending = [pipe.largest_bending_moment(pipe.section_forces(state)) for state in kept]
-    quarters = np.array([_quarters(pipe, state.position, state.quaternion) for state in kept])
-    return spent, Histories(quarters, 0.5 * (top[at - 1] + top[at]), np.array(bending))
+@dataclass(frozen=True)
+class Race:
+    """A run of another contestant that ours must beat `factor` times, with an error of at most `error` [m] (None: of its own)."""
+
+    against: Setting
+    factor: float
+    error: float | None = None
 
 
-def _quarters(pipe: Pipe, position: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-    """Positions (3, 3) at L/4, L/2 and 3L/4, by Hermite's cubic along the first axes of the sections."""
-    along = np.array([np.array(matrix(tuple(q)))[:, 0] for q in quaternion])
-    curve = CubicHermiteSpline(pipe.s, position, along)
-    return np.asarray(curve(pipe.s[-1] * np.array([0.25, 0.5, 0.75])))
+def _own(*pairs: tuple[int, float]) -> tuple[Setting, ...]:
+    return tuple(Setting(OWN, n, h, "adapted") for n, h in pairs)
+
+
+_OURS = (
+    *_own((12, 0.4), (16, 0.4), (24, 0.4), (24, 0.2), (32, 0.2), (40, 0.4 / 3), (48, 0.1), (64, 0.1), (64, 0.05), (96, 0.05)),
+    *(Setting(UNIFORM, n, h) for n, h in ((40, 0.2), (48, 0.4 / 3), (48, 0.1), (80, 0.05), (96, 0.05))),
+    *(Setting(FMU, n, h, "adapted") for n, h in ((24, 0.2), (48, 0.1), (96, 0.05))),
+)
+_COARSE, _FINE = Setting(EXUDYN, 48, 0.1), Setting(EXUDYN, 96, 0.05)
+_LUMPED, _LUMPED_FINE = Setting(MOORDYN, 48, 0.00625), Setting(MOORDYN, 192, 0.00156, repeats=1)
+_PAPER = tuple(Setting(PAPER, n, 1e-2, repeats=1) for n in (24, 48, 96))
+_STUCK = Setting(PAPER, 24, 1e-3, repeats=1, span=48.0)  # from 40 s on its step falls below a millisecond
+_EXUDYN = (Setting(EXUDYN, 24, 0.2), Setting(EXUDYN, 48, 0.2), _COARSE, _FINE, Setting(BARE, 48, 0.1))
+_SHEAR = f"pipe.section.shear_stiffness={PIPE.section.stiffness[1]!r}"
+CASES = {
+    "heave": LineCase(
+        swing(2.0, 12.0), 300.0, (*_OURS, *_EXUDYN, _LUMPED, _LUMPED_FINE, *_PAPER, _STUCK),
+        Setting(OWN, 192, 0.025, "adapted"), Setting(OWN, 96, 0.05, "adapted"), (_SHEAR,),
+    ),
+    "snap": LineCase(
+        swing(6.0, 8.0), 60.0, (*_OURS, *_EXUDYN, _LUMPED, *_PAPER),
+        Setting(OWN, 192, 0.0125, "adapted"), Setting(OWN, 96, 0.025, "adapted"),
+        (_SHEAR, "top_motion.amplitude=[0.0,0.0,-6.0]", "top_motion.period=8.0", "top_motion.ramp=16.0"),
+    ),
+}  # fmt: skip
+RACES = {
+    "heave": (
+        Race(_COARSE, 3.0, 1e-3), Race(_FINE, 3.0, 2e-4), Race(_LUMPED, 10.0), Race(_LUMPED_FINE, 50.0),
+        *(Race(one, 100.0) for one in (*_PAPER, _STUCK)),
+    ),
+}  # fmt: skip
+
+
+def missing() -> list[str]:
+    """Packages of the optional group `bench` that are not installed."""
+    return sorted({package for _, package in CONTESTANTS.values() if package and importlib.util.find_spec(package) is None})
+
+
+def settings(case: LineCase) -> list[Setting]:
+    """The runs of a case that can be made here."""
+    without = missing()
+    return [setting for setting in case.settings if CONTESTANTS[setting.contestant][1] not in without]
+
+
+def count(case: LineCase) -> int:
+    """How many runs a sweep makes."""
+    return 2 + sum(setting.repeats for setting in settings(case))
+
+
+def _run(case: LineCase, setting: Setting) -> tuple[float, Histories]:
+    parameters = replace(PIPE, nodes=setting.elements + 1, mesh="uniform" if setting.mesh == "uniform" else "adapted")
+    return CONTESTANTS[setting.contestant][0](parameters, replace(case, duration=setting.span or case.duration), setting)
 
 
 def sweep(case: LineCase, tick: Callable[[], object]) -> tuple[list[dict[str, Any]], tuple[float, float, float]]:
     """A row for every run, CPU times the medians of interleaved repeats; and the uncertainty of the reference. Raises RunError."""
-    _, exact = run(case, case.reference)
+    exact = _run(case, case.reference)[1]
     tick()
-    spent: dict[Setting, list[float]] = {setting: [] for setting in case.settings}
-    found: dict[Setting, Histories] = {}
-    for _ in range(case.repeats):
-        for setting in case.settings:
-            seconds, found[setting] = run(case, setting)
-            spent[setting].append(seconds)
-            tick()
-    errors = {setting: found[setting].distance(exact) for setting in case.settings}
-    keys = ("position_rms_m", "top_force_rms_N", "bending_rms_N_m")
-    rows = [
-        {"contestant": f"step, {s.mesh} mesh", **asdict(s), "cpu_s": statistics.median(spent[s]), **dict(zip(keys, errors[s], strict=True))}
-        for s in case.settings
-    ]
-    finest = min(case.settings, key=lambda s: (-s.elements, s.step_s, s.mesh != case.reference.mesh))
-    return rows, errors[finest]
+    uncertainty = _run(case, case.check)[1].distance(exact)
+    tick()
+    wanted = settings(case)
+    spent: dict[Setting, list[float]] = {setting: [] for setting in wanted}
+    errors: dict[Setting, tuple[float, float, float]] = {}
+    for turn in range(max(setting.repeats for setting in wanted)):
+        for setting in wanted:
+            if turn < setting.repeats:
+                seconds, found = _run(case, setting)
+                spent[setting].append(seconds)
+                errors[setting] = found.distance(exact.until(len(found.position)))
+                tick()
+    rows: list[dict[str, Any]] = [
+        {
+            "contestant": s.contestant, "elements": s.elements, "step_s": s.step_s, "mesh": s.mesh, "repeats": s.repeats,
+            "simulated_s": s.span or case.duration, "cpu_s": statistics.median(spent[s]), **dict(zip(KEYS, errors[s], strict=True)),
+        }
+        for s in wanted
+    ]  # fmt: skip
+    for row in rows:
+        row["cpu_share"] = row["cpu_s"] / row["simulated_s"]
+    return rows, uncertainty
 
 
-def draw(path: Path, name: str, rows: list[dict[str, Any]], uncertainty: float) -> None:
-    """Work-precision figure: CPU time against position error, one line per contestant."""
-    looks = (("-", "o"), ("--", "s"), (":", "^"))
-    with _figure(path, f"{name}: CPU time against error", (5.6, 4.0)) as figure:
-        axes: Axes = figure.subplots()
-        for (line, marker), one in zip(looks, dict.fromkeys(row["contestant"] for row in rows), strict=False):
-            mine = sorted((row["position_rms_m"], row["cpu_s"]) for row in rows if row["contestant"] == one)
-            axes.loglog(*zip(*mine, strict=True), color="#161616", linestyle=line, marker=marker, markerfacecolor="white", label=one)
-        axes.axvline(uncertainty, color="#8a8a8a", linewidth=1.0, linestyle="-.", label="uncertainty of the reference")
-        axes.set(xlabel="Position error, rms over time [m]", ylabel="CPU time [s]")
-        axes.legend()
+def verdicts(name: str, rows: Sequence[dict[str, Any]]) -> list[tuple[str, float, float]]:
+    """What is raced, how many times faster ours is, and how many times it must be at least; what did not run is left out."""
+    found = []
+    for race in RACES.get(name, ()):
+        theirs = next((row for row in rows if (row["contestant"], row["elements"], row["step_s"]) == _key(race.against)), None)
+        if theirs is None:
+            continue
+        error = theirs["position_rms_m"] if race.error is None else race.error
+        able = [row for row in rows if row["contestant"] in (OWN, UNIFORM) and row["position_rms_m"] <= error]
+        best = min(able, key=lambda row: row["cpu_share"], default=None)
+        ours = f"ours at {error:.2g} m, {best['elements']} x {best['step_s']:.3g} s" if best else f"none of ours reaches {error:.2g} m"
+        what = f"{race.against.contestant} {race.against.elements} x {race.against.step_s:g} ({theirs['position_rms_m']:.2g} m) over {ours}"
+        found.append((what, theirs["cpu_share"] / best["cpu_share"] if best else 0.0, race.factor))
+    return found
+
+
+def _key(setting: Setting) -> tuple[str, int, float]:
+    return setting.contestant, setting.elements, setting.step_s

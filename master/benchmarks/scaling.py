@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_banded
 
-from master.benchmarks.line import _PIPE
+from master.benchmarks.line import PIPE
 from master.errors import RunError
 from master.hard_cases import swing
 from pipe_fmu import Pipe
@@ -27,7 +27,7 @@ _STEPS, _STEP_S = 15, 0.1
 
 def measure(nodes: int) -> dict[str, Any]:
     """CPU times [s] of a step and of the banded solve, medians taken in turn, and peak memory [MB] of this process. Raises RunError."""
-    pipe, motion, still = Pipe(replace(_PIPE, nodes=nodes, mesh="uniform")), swing(2.0, 12.0), np.zeros(3)
+    pipe, motion, still = Pipe(replace(PIPE, nodes=nodes, mesh="uniform")), swing(2.0, 12.0), np.zeros(3)
     found, state = pipe.start(0.0)
     if not found.converged:
         raise RunError(f"statics with {nodes} nodes failed, residual {found.residual:.1e}")
