@@ -16,10 +16,10 @@ NEUTRAL = 1e-8  # of the metric: stiffness that counts as none
 _HELD = 1e6  # of the metric: stiffness given to what is held
 
 
-def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], metric: Array) -> bool:
+def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], metric: Array, added: Array) -> bool:
     """Whether the tangent `blocks` (n, 6, 6), (n - 1, 6, 6) x 2 of free ends is positive definite once they are held.
 
-    quaternion (n, 4); metric (6,): stiffness [N/m, N m] that is compared with.
+    quaternion (n, 4); metric (6,): stiffness [N/m, N m] that is compared with; added (n, 6): stiffness added to the diagonal.
     """
     diagonal, lower, upper = blocks
     block = 0.5 * (diagonal + diagonal.transpose(0, 2, 1))
@@ -27,7 +27,7 @@ def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], 
     for node, free in ((0, _foot(line, quaternion)), (-1, _top(line))):
         block[node] = free @ block[node] @ free + (np.eye(SIZE) - free) * _HELD * metric
         side[node] = free @ side[node] if node == 0 else side[node] @ free
-    block[:, range(SIZE), range(SIZE)] += NEUTRAL * metric
+    block[:, range(SIZE), range(SIZE)] += NEUTRAL * metric + added
     return bool(_cholesky(block, side))
 
 
