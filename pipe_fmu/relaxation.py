@@ -23,7 +23,7 @@ TOLERANCE = 1e-11  # of the line's weight (times its longest element, for moment
 ROUND_OFF = 1e-7  # accepted once the residual no longer falls
 LOST = 1e12  # residual from which there is no way back
 _CORRECTIONS = 60  # of Newton's method
-_DESCENTS = 2000
+_DESCENTS = 1000
 _TURN = 0.25  # rad of one correction
 _INNER = 6  # corrections of one step of a descent
 _SHARE = 0.1  # of the promised energy that a step must release
@@ -54,7 +54,7 @@ def newton(balance: Balance) -> Rest:
         if not balance.size < LOST:
             break
         if _resting(balance.size, best):
-            return Rest(balance, True, balance.definite(), iteration)
+            return Rest(balance, True, balance.stable(), iteration)
         best = min(best, balance.size)
         factors = Factors(balance, 0.0)
         if not factors.regular:
@@ -72,7 +72,7 @@ def descend(balance: Balance) -> Rest:
     damping, turn, best, iteration = 0.0, _TURN, math.inf, 0
     for iteration in range(_DESCENTS):
         definite = balance.definite()
-        if definite and _resting(balance.size, best):
+        if _resting(balance.size, best) and (definite or balance.stable()):
             return Rest(balance, True, True, iteration)
         best = min(best, balance.size)
         if not definite:

@@ -1,8 +1,7 @@
 """A line at rest with its top held: forces, potential and tangent at a pose, and the corrections that follow from them."""
 
-import math
-
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigs
 
 from .block_tridiagonal import condense, factorize, substitute
 from .compiled import kernel
@@ -15,6 +14,8 @@ from .static_kernel import spin, static_system
 Pose = tuple[Array, Array]  # positions (n, 3) [m], attitudes (n, 4)
 
 _ROUND_OFF = 1e-12  # of the sum of absolute potentials
+_NEUTRAL = 1e-6  # of the weight over the length: about the stiffness of a hanging line
+_NEAREST = 8  # eigenvalues looked at
 
 
 @kernel
@@ -34,8 +35,8 @@ def moved(pose: Pose, move: Array) -> Pose:
 
 
 class Scales:
-    """What forces are measured by: `force` (6,), the line's weight (times its longest element for moments); `metric` (n, 6), the weight
-    at each node per metre (times its own length squared over twelve, per radian).
+    """What a line is measured by: `force` (6,), its weight (times its longest element for moments); `metric` (n, 6), the weight
+    at each node [N] (times its own length squared over twelve); `neutral` [1/m]: of the metric, stiffness that counts as none.
     """
 
     def __init__(self, line: Line) -> None:
@@ -43,9 +44,8 @@ class Scales:
         longest = float(line.length.max())
         self.force = float(weight.sum()) * np.array([1.0, 1.0, 1.0, longest, longest, longest])
         node, length = (0.5 * (np.append(a, 0.0) + np.append(0.0, a)) for a in (weight, line.length))
-        node = np.maximum(node, 1e-12 * node.max())
         self.metric = np.column_stack([node] * 3 + [node * length**2 / 12.0] * 3)
-        self.stiffness = self.force / float(line.length.sum())  # (6,)
+        self.neutral = _NEUTRAL / float(line.length.sum())
 
 
 class Balance:
@@ -75,9 +75,32 @@ class Balance:
         hold_foot_residual(self.line, self.pose[1], (0.0, 0.0, 0.0), vector)
         vector[-1, : 6 if self.line.top_clamped else 3] = 0.0
 
+    def stable(self) -> bool:
+        """Whether the line comes back when it is pushed.
+
+        It does if the symmetric part of the tangent is positive definite, however it is damped. In still water, where the tangent is
+        symmetric, this is all there is to it. The drag of a current has no potential and its part of the tangent is not symmetric; where the
+        symmetric part is not definite, the line, moving as if damped by the metric, still comes back if all eigenvalues of the tangent have
+        positive real parts (Lyapunov's first method). The eight nearest to zero are looked at.
+        """
+        return self.definite() or (bool(self.pull.any()) and self._attracting())
+
     def definite(self, damping: float = 0.0) -> bool:
         """Whether the symmetric part of the tangent, with `damping` [1/m] times the metric, is positive definite."""
-        return positive(self.line, self.pose[1], self.tangent, self.scales.stiffness, damping * self.scales.metric)
+        return positive(self.line, self.pose[1], self.tangent, (self.scales.neutral + damping) * self.scales.metric)
+
+    def _attracting(self) -> bool:
+        factors = Factors(self, self.scales.neutral)
+
+        def undone(flat: Array) -> Array:
+            right = self.scales.metric * flat.reshape(-1, 6)
+            self.hold(right)
+            return -factors.correction(right).ravel()
+
+        size = self.residual.size
+        operator = LinearOperator((size, size), matvec=undone, dtype=float)
+        nearest = eigs(operator, k=_NEAREST, which="LM", v0=np.ones(size), return_eigenvectors=False)
+        return bool((nearest.real > 0.0).all())
 
     def along(self, move: Array) -> Array:
         """Tangent times displacements and spins (n, 6)."""

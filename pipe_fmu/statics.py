@@ -13,6 +13,8 @@ from .relaxation import relax
 from .so3 import conjugate, exp, log, multiply, scale
 from .static_balance import Balance, Factors, Pose, Scales
 
+_HAULED_FROM = 0.9  # of the taut distance
+_HAULS = 16  # steps in which the top is hauled in
 _TURN_OF_TOP = 0.35  # rad of one load step of the top section
 
 
@@ -36,10 +38,10 @@ def solve(line: Line, s: Array, water: Water, top: tuple[float, float, float], a
     line, s (n,): the discretised line; water: current at the time of the start.
     """
     scales, free = Scales(line), line._replace(top_clamped=False)
-    still = Water(np.zeros(0), np.zeros((0, 3)), False)
-    result = equilibrium(free, still, scales, _catenary(line, s, top))
-    if result.converged and water.levels.shape[0] > 0:
-        result = equilibrium(free, water, scales, (result.position, result.quaternion))
+    result = _hung(free, water, scales, s, top)
+    if not result.stable:
+        hauled = _hauled(free, water, scales, s, top)
+        result = hauled if hauled.stable or not result.converged else result
     if attitude is None or not line.top_clamped or not result.converged:
         return result
     held = tuple(float(x) for x in attitude)
@@ -52,6 +54,31 @@ def solve(line: Line, s: Array, water: Water, top: tuple[float, float, float], a
         result = equilibrium(line, water, scales, (result.position, quaternion))
         if not result.converged:
             break
+    return result
+
+
+def _hung(line: Line, water: Water, scales: Scales, s: Array, top: tuple[float, float, float]) -> Equilibrium:
+    """Equilibrium of the line hanging from `top` (3,): from the catenary in still water, then in the current."""
+    still = water._replace(levels=np.zeros(0), velocities=np.zeros((0, 3)))
+    result = equilibrium(line, still, scales, _catenary(line, s, top))
+    if result.converged and water.levels.shape[0] > 0:
+        result = equilibrium(line, water, scales, (result.position, result.quaternion))
+    return result
+
+
+def _hauled(line: Line, water: Water, scales: Scales, s: Array, top: tuple[float, float, float]) -> Equilibrium:
+    """Equilibrium of the line hanging from `top` (3,), its top hauled in from where it is nearly taut, so that slack is carried off as it
+    comes.
+    """
+    heading = math.atan2(top[1], top[0])
+    reach = _HAULED_FROM * math.sqrt(max(float(s[-1]) ** 2 - top[2] ** 2, 0.0))
+    away = (reach * math.cos(heading), reach * math.sin(heading), top[2])
+    result = _hung(line, water, scales, s, away)
+    move = np.outer(s / s[-1], (np.array(top) - away) / _HAULS)
+    for _ in range(_HAULS):
+        if not result.converged:
+            break
+        result = equilibrium(line, water, scales, (result.position + move, result.quaternion))
     return result
 
 
