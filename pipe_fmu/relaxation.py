@@ -23,7 +23,7 @@ TOLERANCE = 1e-11  # of the line's weight (times its longest element, for moment
 ROUND_OFF = 1e-7  # accepted once the residual no longer falls
 LOST = 1e12  # residual from which there is no way back
 _CORRECTIONS = 60  # of Newton's method
-_DESCENTS = 1000
+DESCENTS = 1000
 _TURN = 0.25  # rad of one correction
 _INNER = 6  # corrections of one step of a descent
 _SHARE = 0.1  # of the promised energy that a step must release
@@ -41,10 +41,10 @@ class Rest(NamedTuple):
     iterations: int
 
 
-def relax(start: Balance) -> Rest:
+def relax(start: Balance, descents: int) -> Rest:
     """Stable equilibrium near a pose: Newton's if that is one, else where a descent from the pose ends."""
     found = newton(start)
-    return found if found.stable else descend(start)
+    return found if found.stable else descend(start, descents)
 
 
 def newton(balance: Balance) -> Rest:
@@ -67,10 +67,10 @@ def _resting(size: float, best: float) -> bool:
     return size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * best)
 
 
-def descend(balance: Balance) -> Rest:
+def descend(balance: Balance, limit: int) -> Rest:
     """Stable equilibrium by descent from a pose."""
     damping, turn, best, iteration = 0.0, _TURN, math.inf, 0
-    for iteration in range(_DESCENTS):
+    for iteration in range(limit):
         definite = balance.definite()
         if _resting(balance.size, best) and (definite or balance.stable()):
             return Rest(balance, True, True, iteration)

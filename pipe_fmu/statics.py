@@ -9,12 +9,14 @@ import numpy as np
 
 from . import catenary
 from .line import Array, Line, Water
-from .relaxation import relax
+from .relaxation import DESCENTS, relax
 from .so3 import conjugate, exp, log, multiply, scale
 from .static_balance import Balance, Factors, Pose, Scales
 
 _HAULED_FROM = 0.9  # of the taut distance
-_HAULS = 16  # steps in which the top is hauled in
+_LONGEST_HAUL = 1.0 / 8.0  # of the way in, in one step,
+_SHORTEST_HAUL = 1.0 / 512.0  # and the step at which the line may fall into another shape
+_FEW = 60  # steps of descent, while the step of the haul can be shortened
 _TURN_OF_TOP = 0.35  # rad of one load step of the top section
 
 
@@ -74,17 +76,22 @@ def _hauled(line: Line, water: Water, scales: Scales, s: Array, top: tuple[float
     reach = _HAULED_FROM * math.sqrt(max(float(s[-1]) ** 2 - top[2] ** 2, 0.0))
     away = (reach * math.cos(heading), reach * math.sin(heading), top[2])
     result = _hung(line, water, scales, s, away)
-    move = np.outer(s / s[-1], (np.array(top) - away) / _HAULS)
-    for _ in range(_HAULS):
-        if not result.converged:
-            break
-        result = equilibrium(line, water, scales, (result.position + move, result.quaternion))
+    way = np.outer(s / s[-1], np.array(top) - away)
+    reached, step = 0.0, _LONGEST_HAUL
+    while result.stable and reached < 1.0:
+        wanted = min(1.0, reached + step)
+        start = result.position + (wanted - reached) * way, result.quaternion
+        trial = equilibrium(line, water, scales, start, _FEW if step > _SHORTEST_HAUL else DESCENTS)
+        if trial.stable or step <= _SHORTEST_HAUL:
+            reached, result, step = wanted, trial, min(1.5 * step, _LONGEST_HAUL)
+        else:
+            step *= 0.5
     return result
 
 
-def equilibrium(line: Line, water: Water, scales: Scales, pose: Pose) -> Equilibrium:
-    """Equilibrium near a pose, with the top held where it is."""
-    balance, converged, stable, iterations = relax(Balance(line, water, scales, pose))
+def equilibrium(line: Line, water: Water, scales: Scales, pose: Pose, descents: int = DESCENTS) -> Equilibrium:
+    """Equilibrium near a pose, with the top held where it is, in at most so many steps of descent."""
+    balance, converged, stable, iterations = relax(Balance(line, water, scales, pose), descents)
     factors = Factors(balance, 0.0)
     stiffness = factors.stiffness() if factors.regular else np.full((6, 6), math.nan)
     return Equilibrium(converged, *balance.pose, balance.top, balance.foot, stiffness, stable, iterations, balance.size)
