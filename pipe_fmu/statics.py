@@ -16,7 +16,7 @@ from .static_balance import Balance, Factors, Pose, Scales
 _HAULED_FROM = 0.9  # of the taut distance
 _LONGEST_HAUL = 1.0 / 8.0  # of the way in, in one step,
 _SHORTEST_HAUL = 1.0 / 512.0  # and the step at which the line may fall into another shape
-_FEW = 60  # steps of descent, while the step of the haul can be shortened
+_FEW = 150  # steps of descent, while the step of the haul can be shortened
 _TURN_OF_TOP = 0.35  # rad of one load step of the top section
 
 
