@@ -4,11 +4,12 @@ Descent is Levenberg's method with a step that is solved for: a pose is followed
 
     energy + damping / 2 |move|^2,    the damping such that the tangent is positive definite,
 
-approximately, by Newton corrections that stop as soon as a share of the promised energy is released (the first correction is Levenberg's own;
-those after it take out the stretch that turning by finite angles has made). Where the tangent is not definite the pose may also leave
-along a direction of negative curvature, without which a saddle could hold it. In still water every pose has less potential energy than the
-one before, and only stable equilibria are left where the descent can end (More and Sorensen 1983; the energy is bounded from below). In a
-current the work of the drag along the way counts as released too: the line moves as if overdamped.
+approximately, by Newton corrections that stop as soon as a share of the promised energy is released (the first is Levenberg's own; those
+after it take out the stretch that turning by finite angles has made). Where the tangent is not definite the pose may also leave along a
+direction of negative curvature, without which a saddle could hold it. In still water every pose has less potential energy than the one
+before, and only stable equilibria are left where the descent can end (More and Sorensen 1983); how soon is another matter where a long
+slack line lies on a bed without friction and hardly any energy tells one shape from another. In a current the work of the drag along the
+way counts as released too: the line moves as if overdamped.
 """
 
 import math
@@ -42,7 +43,7 @@ class Rest(NamedTuple):
 
 
 def relax(start: Balance, descents: int) -> Rest:
-    """Stable equilibrium near a pose: Newton's if that is one, else where a descent from the pose ends."""
+    """Stable equilibrium near a pose: Newton's if that is one, else where `descents` steps of descent from the pose end."""
     found = newton(start)
     return found if found.stable else descend(start, descents)
 
@@ -68,7 +69,7 @@ def _resting(size: float, best: float) -> bool:
 
 
 def descend(balance: Balance, limit: int) -> Rest:
-    """Stable equilibrium by descent from a pose."""
+    """Stable equilibrium by descent from a pose, in at most `limit` steps."""
     damping, turn, best, iteration = 0.0, _TURN, math.inf, 0
     for iteration in range(limit):
         definite = balance.definite()

@@ -29,7 +29,8 @@ def spin(quaternion, i):
 def static_system(line, water, position, quaternion, diagonal, lower, upper, residual, pull):
     """Fill the tangent (n, 6, 6), (n-1, 6, 6) x 2 and residual (n, 6) = internal - external forces; boundary rows untouched.
 
-    position (n, 3), quaternion (n, 4); `pull` (n, 6) is filled with minus the drag, which the residual contains. Returns the potentials (elastic, gravity, contact) [J]; the drag of the current has none.
+    position (n, 3), quaternion (n, 4); `pull` (n, 6) is filled with minus the drag, which the residual contains.
+    Returns the potentials (elastic, gravity, contact) [J]; the drag of the current has none. The tangent is exact.
     """
     clear(diagonal, lower, upper)
     residual[:] = 0.0
