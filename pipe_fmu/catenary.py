@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LEAST_HEIGHT = 1e-6  # of the length: a top on the bed
+_LEAST_BEND = 0.02  # of the height: horizontal force over weight per length where the line touches down, of a start
+_TIGHTEST = 3.8  # largest heading [rad] of a meander: its chord has turned back
 
 
 def parameter(length: float, distance: float, height: float, on_bed: bool) -> tuple[float, float]:
@@ -44,21 +46,42 @@ def _sinhc(q: float) -> float:
 def _root(increasing: Callable[[float], float], low: float, high: float) -> float:
     """Root of a function between `low` and `high`, to the last bit, by bisection.
 
-    The functions here cost a microsecond; scipy's solvers would cost every exported unit half a second at its start, and 140 MB.
+    The functions here cost microseconds; scipy's solvers would cost every exported unit half a second at its start, and 140 MB.
     """
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (low, middle) if increasing(middle) > 0.0 else (middle, high)
     return middle
 
 
+def _meander(part: Array, span: float) -> tuple[Array, Array, Array]:
+    """Sine-generated curve of unit length: (along its chord, aside of it, heading) at the parts (n,) of its length; `span` is its chord.
+
+    Its heading, a sin(2 pi s), vanishes at both ends; the chord is J_0(a) (Langbein and Leopold 1966, USGS Prof. Paper 422-H), here the
+    mean of cos(a sin) over a period, for which equal steps are exact.
+    """
+    fine = np.linspace(0.0, 1.0, 401)
+    wave = np.sin(2.0 * math.pi * fine)
+    amplitude = _root(lambda a: span - float(np.cos(a * wave[1:]).mean()), 0.0, _TIGHTEST) if span < 1.0 else 0.0
+    heading = amplitude * wave
+    along, aside = (np.concatenate([[0.0], np.cumsum(0.5 * (f[1:] + f[:-1]))]) / 400.0 for f in (np.cos(heading), np.sin(heading)))
+    return np.interp(part, fine, along), np.interp(part, fine, aside), np.interp(part, fine, heading)
+
+
 def shape(s: Array, length: float, top: tuple[float, float, float], on_bed: bool) -> tuple[Array, Array]:
-    """Positions (n, 3) [m] and attitudes (n, 4) of the sections at arc lengths `s` (n,) of a line from the origin to `top`, in e."""
+    """Positions (n, 3) [m] and attitudes (n, 4) of the sections at arc lengths `s` (n,) of a line from the origin to `top`, in e.
+
+    What lies on the bed and is longer than its span meanders.
+    """
     distance, height, heading = math.hypot(top[0], top[1]), -top[2], math.atan2(top[1], top[0])
     height = max(height, LEAST_HEIGHT * length)
     c, lying = parameter(length, distance, height, on_bed)
+    aside, turn = np.zeros_like(s), np.zeros_like(s)
     if lying > 0.0:
+        c = max(c, min(_LEAST_BEND * height, 0.25 * (length - height)))
+        lying = length - math.sqrt(height**2 + 2.0 * height * c)
+        forward, aside, turn = _meander(np.minimum(s / lying, 1.0), (distance - c * math.acosh(1.0 + height / c)) / lying)
         hung = np.maximum(s - lying, 0.0)
-        forward = np.minimum(s, lying) * (distance - c * math.acosh(1.0 + height / c)) / lying + c * np.arcsinh(hung / c)
+        forward, aside = lying * forward + c * np.arcsinh(hung / c), lying * aside
         up = np.sqrt(hung**2 + c**2) - c
         slope = np.arctan2(hung, c)
     else:
@@ -67,9 +90,10 @@ def shape(s: Array, length: float, top: tuple[float, float, float], on_bed: bool
         forward = low + c * np.arcsinh((s + at_foot) / c)
         up = np.hypot(s + at_foot, c) - math.hypot(at_foot, c)
         slope = np.arctan2(s + at_foot, c)
-    position = np.column_stack([forward * math.cos(heading), forward * math.sin(heading), -up])
-    pitch = np.column_stack([np.cos(0.5 * slope), 0.0 * s, np.sin(0.5 * slope), 0.0 * s])
-    a, b = math.cos(0.5 * heading), math.sin(0.5 * heading)
-    attitude = np.column_stack([a * pitch[:, 0], -b * pitch[:, 2], a * pitch[:, 2], b * pitch[:, 0]])
+    ahead, across = math.cos(heading), math.sin(heading)
+    position = np.column_stack([forward * ahead - aside * across, forward * across + aside * ahead, -up])
+    turn, slope = 0.5 * (turn + heading), 0.5 * slope
+    pitch, level = np.sin(slope), np.cos(slope)
+    attitude = np.column_stack([np.cos(turn) * level, -np.sin(turn) * pitch, np.cos(turn) * pitch, np.sin(turn) * level])
     position[-1] = top
     return position, attitude

@@ -74,6 +74,20 @@ def _half_spin(z):
 
 
 @inner
+def mid_spin(psi, beta, mu):
+    """Spin beta_m of the mid frame under the mean spin beta and the spin difference mu, all in the same frame."""
+    return add(beta, scale(-_half_spin(dot(psi, psi))[0], cross(psi, mu)))
+
+
+@inner
+def relative_turn(psi, mu):
+    """A^-1 mu: change of psi, seen from the mid frame, under the spin difference mu, all in the same frame."""
+    z = dot(psi, psi)
+    chi = _chi(z)[0]
+    return add(scale(1.0 + z * chi, mu), scale(-chi * dot(psi, mu), psi))
+
+
+@inner
 def frame(q1, q2, d):
     """Mid frame (rows of R_m), chord in it and relative rotation vector: (rm, u, psi)."""
     relative = multiply(conjugate(q1), q2)

@@ -29,7 +29,7 @@ def energies(line, position, quaternion, velocity, rate, flow, strain):
 
 @inner
 def contact_potential(h, diameter, weight, z1, z2, sag):
-    """Potential [J] of one element on the bed, at the same points as loads.add_contact."""
+    """Potential [J] of one element on the bed, at the same points as loads.press."""
     total = 0.0
     for k in range(4):
         x = BED_POINTS[k]

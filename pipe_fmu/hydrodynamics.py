@@ -38,3 +38,20 @@ def current_at(z, levels, velocities):
         velocities[k - 1, 1] + f * (velocities[k, 1] - velocities[k - 1, 1]),
         velocities[k - 1, 2] + f * (velocities[k, 2] - velocities[k - 1, 2]),
     )
+
+
+@inner
+def current_slope(z, levels, velocities):
+    """Derivative (3,) of the current with respect to the depth coordinate z [1/s]."""
+    n = levels.shape[0]
+    if z <= levels[0] or z >= levels[n - 1]:
+        return (0.0, 0.0, 0.0)
+    k = 1
+    while levels[k] < z:
+        k += 1
+    rate = 1.0 / (levels[k] - levels[k - 1])
+    return (
+        rate * (velocities[k, 0] - velocities[k - 1, 0]),
+        rate * (velocities[k, 1] - velocities[k - 1, 1]),
+        rate * (velocities[k, 2] - velocities[k - 1, 2]),
+    )

@@ -14,7 +14,7 @@ from .hydrodynamics import current_at, drag
 from .seabed import contact, mean_contact
 from .so3 import add, apply, cross, dot, scale
 
-_DRAG_POINTS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
+DRAG_POINTS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 BED_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 BED_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
 
@@ -62,7 +62,7 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
     """Drag on one element into `vector` (12,) (minus the force on the pipe) and, if `fresh`, its tangent into `matrix` (12, 12).
 
     rm, u, psi: frame, chord in it and relative rotation; `ends` (2, 6) velocities (v, w) of the nodes; `depths` (2,) their z;
-    `rate` = d velocity / d unknown [1/s], 0 in statics; the rotation of t1 is weighted 1 in statics, 1/2 in a step. `scratch` (2, 3, 12).
+    `rate` = d velocity / d unknown [1/s]; `scratch` (2, 3, 12).
     Returns (power dissipated >= 0, power supplied by the current) [W].
     """
     d = apply(rm, u)
@@ -72,9 +72,8 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
     swing = _sag_rate(d, bow, v1, v2, (ends[0, 3], ends[0, 4], ends[0, 5]), (ends[1, 3], ends[1, 4], ends[1, 5]))
     sag = 0.5 * (d[0] * bow[1] - d[1] * bow[0])
     dissipated, supplied = 0.0, 0.0
-    turn = 0.5 if rate > 0.0 else 1.0
     moves, slopes = scratch[0], scratch[1]
-    for x in _DRAG_POINTS:
+    for x in DRAG_POINTS:
         y = 1.0 - x
         linked = x * y
         bend = cross(scale(x - 0.5, psi), (1.0, 0.0, 0.0))
@@ -111,8 +110,8 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
             k = 2.0 * coefficients[0] * math.fabs(v_t) * s_t
             change = add(change, add(scale(k, tangent), scale(coefficients[0] * math.fabs(v_t) * v_t, d_t)))
             for i in range(3):
-                slopes[i, 3 + j] += 0.25 * h * turn * change[i]
-                slopes[i, 9 + j] += 0.25 * h * turn * change[i]
+                slopes[i, 3 + j] += 0.125 * h * change[i]
+                slopes[i, 9 + j] += 0.125 * h * change[i]
         for i in range(12):
             for j in range(12):
                 matrix[i, j] += moves[0, i] * slopes[0, j] + moves[1, i] * slopes[1, j] + moves[2, i] * slopes[2, j]
@@ -137,27 +136,46 @@ def bed_on_sag(h, dt, diameter, weight, damping, old, new):
 
 
 @inner
-def add_contact(h, diameter, weight, z1, z2, sag, sag_row, vector, matrix, scratch):
-    """Static reaction of the bed on one element; `sag_row` (9,) gradient of the sag; `scratch` (2, 3, 12). Returns its potential [J]."""
-    potential = 0.0
-    row = scratch[0, 0]
+def press(h, diameter, weight, z1, z2, sag, points):
+    """Static reaction of the bed on one element: upward force [N] and stiffness [N/m] of its points into `points` (4, 2).
+
+    Returns (potential [J], its derivative with respect to the sag [N]).
+    """
+    potential, on_sag = 0.0, 0.0
     for k in range(4):
         x = BED_POINTS[k]
         y = 1.0 - x
         u, force, stiffness = contact(y * z1 + x * z2 + x * y * sag, diameter, weight)
-        if stiffness == 0.0:
-            continue
         share = h * BED_WEIGHTS[k]
+        points[k, 0], points[k, 1] = share * force, share * stiffness
         potential += share * u
+        on_sag += x * y * share * force
+    return potential, on_sag
+
+
+@inner
+def add_press(points, vector):
+    """Add the nodes' share of the reaction to `vector` (12,), without what goes by way of the sag."""
+    for k in range(4):
+        x = BED_POINTS[k]
+        vector[2] += (1.0 - x) * points[k, 0]
+        vector[8] += x * points[k, 0]
+
+
+@inner
+def add_press_stiffness(points, sag_row, matrix, row):
+    """Add the tangent of the reaction to `matrix` (12, 12), but for the turning of `sag_row` (9,), the gradient of the sag; `row` (12,)."""
+    for k in range(4):
+        if points[k, 1] == 0.0:
+            continue
+        x = BED_POINTS[k]
+        y = 1.0 - x
         expand(sag_row, row)
         for i in range(12):
             row[i] *= x * y
         row[2] += y
         row[8] += x
-        for i in range(12):
-            vector[i] += share * force * row[i]
-        add_outer(matrix, share * stiffness, row, row)
-    return potential
+        add_outer(matrix, points[k, 1], row, row)
 
 
 @inner

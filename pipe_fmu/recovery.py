@@ -14,7 +14,7 @@ from .assembly import expand
 from .compiled import inner
 from .element import ROWS, STRAINS, frame, gradients
 from .line import Array, Line, Water
-from .loads import add_contact, add_drag
+from .loads import add_drag, add_press, press
 from .parameters import PipeParameters
 from .so3 import apply_transposed, matrix
 from .static_kernel import chord, spin
@@ -61,14 +61,14 @@ def _largest_square(s, moment, shear):
 def nodal_wrenches(line: Line, water: Water, position: Array, quaternion: Array, velocity: Array, strain: Array) -> Array:
     """Section force and moment (n, 6) at the nodes, material components."""
     out = np.zeros((len(position), 6))
-    elemental = np.empty((ROWS, 9)), np.empty((12, 12)), np.empty((2, 3, 12)), np.zeros((2, 6)), np.empty((3, 12))
+    elemental = np.empty((ROWS, 9)), np.empty((12, 12)), np.empty((2, 3, 12)), np.zeros((2, 6)), np.empty((3, 12)), np.zeros((4, 2))
     _nodal_wrenches(line, water, position, quaternion, velocity, strain, out, elemental)
     return out
 
 
 @inner
 def _nodal_wrenches(line, water, position, quaternion, velocity, strain, out, elemental):
-    rows, unused, scratch, ends, vectors = elemental
+    rows, unused, scratch, ends, vectors, points = elemental
     nine, vector, depths = vectors[0, :9], vectors[1], vectors[2]
     n = position.shape[0]
     for e in range(n - 1):
@@ -76,22 +76,23 @@ def _nodal_wrenches(line, water, position, quaternion, velocity, strain, out, el
         rm, u, psi = frame(spin(quaternion, e), spin(quaternion, e + 1), chord(position, e))
         gradients(rm, u, psi, h, line.share[e], rows)
         weight = h * line.weight[e]
+        depths[0], depths[1] = position[e, 2], position[e + 1, 2]
+        on_sag = -weight / 6.0
+        if line.bed.shape[0] > 0:
+            on_sag += press(h, line.diameter[e], line.weight[e], depths[0], depths[1], strain[e, STRAINS], points)[1]
         nine[:] = 0.0
         for k in range(ROWS):
-            stress = h * line.stiffness[e, k] * strain[e, k] if k < STRAINS else -weight / 6.0
+            stress = h * line.stiffness[e, k] * strain[e, k] if k < STRAINS else on_sag
             for i in range(9):
                 nine[i] += stress * rows[k, i]
         expand(nine, vector)
         vector[2] -= 0.5 * weight
         vector[8] -= 0.5 * weight
-        depths[0], depths[1] = position[e, 2], position[e + 1, 2]
+        add_press(points, vector)
         if water.drag:
             for i in range(3):
                 ends[0, i], ends[1, i] = velocity[e, i], velocity[e + 1, i]
             add_drag(rm, u, psi, h, line.drag[e], ends, depths, water.levels, water.velocities, 0.0, False, vector, unused, scratch)
-        if line.bed.shape[0] > 0:
-            sag = strain[e, STRAINS]
-            add_contact(h, line.diameter[e], line.weight[e], depths[0], depths[1], sag, rows[STRAINS], vector, unused, scratch)
         for i in range(6):
             out[e, i] -= vector[i] * (1.0 if e == 0 else 0.5)
             out[e + 1, i] += vector[6 + i] * (1.0 if e == n - 2 else 0.5)

@@ -1,4 +1,4 @@
-"""Is an equilibrium stable? Symmetric part of the static tangent with the ends held: positive definite if any small push is opposed.
+"""Is an equilibrium stable? The static tangent with the ends held: positive definite if any small push is opposed.
 
 A neutral motion, as the turning of a slack line about the vertical through its two ends, counts as stable.
 """
@@ -12,22 +12,19 @@ from .compiled import kernel
 from .line import Array, Line
 from .so3 import matrix
 
-NEUTRAL = 1e-8  # of the metric: stiffness that counts as none
-_HELD = 1e6  # of the metric: stiffness given to what is held
 
+def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], added: Array) -> bool:
+    """Whether the symmetric part of the tangent `blocks` (n, 6, 6), (n - 1, 6, 6) x 2 of free ends is positive definite once they are held.
 
-def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], metric: Array) -> bool:
-    """Whether the tangent `blocks` (n, 6, 6), (n - 1, 6, 6) x 2 of free ends is positive definite once they are held.
-
-    quaternion (n, 4); metric (6,): stiffness [N/m, N m] that is compared with.
+    quaternion (n, 4); added (n, 6): stiffness [N/m, N m] added to the diagonal.
     """
     diagonal, lower, upper = blocks
     block = 0.5 * (diagonal + diagonal.transpose(0, 2, 1))
     side = 0.5 * (upper + lower.transpose(0, 2, 1))
+    block[:, range(SIZE), range(SIZE)] += added
     for node, free in ((0, _foot(line, quaternion)), (-1, _top(line))):
-        block[node] = free @ block[node] @ free + (np.eye(SIZE) - free) * _HELD * metric
+        block[node] = free @ block[node] @ free + np.eye(SIZE) - free
         side[node] = free @ side[node] if node == 0 else side[node] @ free
-    block[:, range(SIZE), range(SIZE)] += NEUTRAL * metric
     return bool(_cholesky(block, side))
 
 

@@ -152,8 +152,8 @@ def static_system(line, position, quaternion, water=STILL):
     """(residual (6 n,), tangent (6 n, 6 n), potentials) of the line at rest, no end held."""
     n = len(position)
     system = np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6))
-    residual = np.empty((n, 6))
-    potentials = static_kernel.static_system(line, water, position, quaternion, *system, residual)
+    residual, drag = np.empty((n, 6)), np.empty((n, 6))
+    potentials = static_kernel.static_system(line, water, position, quaternion, *system, residual, drag)
     return residual.ravel(), assembled(*system), potentials
 
 

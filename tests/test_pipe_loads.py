@@ -7,7 +7,7 @@ import pytest
 from pipe_helpers import rotation, rotation_vector_quaternion, times
 from reference_bvp import bed_reaction
 
-from pipe_fmu import element, hydrodynamics, loads, seabed
+from pipe_fmu import assembly, element, hydrodynamics, loads, seabed
 from pipe_fmu.environment import Current
 
 DIAMETER, WEIGHT = 0.4, 760.0
@@ -73,7 +73,12 @@ def test_element_on_the_bed_has_the_gradient_of_its_potential():
         strain, rows = np.empty(7), np.empty((7, 9))
         element.strains(rm, u, psi, h, share, strain)
         element.gradients(rm, u, psi, h, share, rows)
-        return loads.add_contact(h, DIAMETER, WEIGHT, z1 + x[2], z1 + d[2] + x[8], strain[6], rows[6], vector, np.zeros((12, 12)), SCRATCH)
+        points, wide = np.empty((4, 2)), np.empty(12)
+        energy, on_sag = loads.press(h, DIAMETER, WEIGHT, z1 + x[2], z1 + d[2] + x[8], strain[6], points)
+        assembly.expand(on_sag * rows[6], wide)
+        vector += wide
+        loads.add_press(points, vector)
+        return energy
 
     force = np.zeros(12)
     energy = potential(np.zeros(12), force)

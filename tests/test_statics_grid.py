@@ -1,17 +1,27 @@
-"""Statics from the scene alone over a grid of lines: 80 of the 200 scenes, from nearly vertical to nearly taut."""
+"""Statics from the scene alone over the whole grid of lines, nearly vertical to nearly taut; a sample of them solved independently."""
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
+import reference_bvp as reference
+from pipe_helpers import pitch, rotation, started
 from statics_grid import equilibrium, scenes
 
-SCENES = [scene for i, scene in enumerate(scenes()) if i % 5 in (2, 4)]
-OPEN = ("124:", "182:", "194:", "197:")  # slack, in a current or with the top turned by 60 degrees: none found yet
+SCENES = scenes()
+OPEN = {  # none found yet, nor shown not to exist: slack on a bed without friction, of which hardly any energy tells one shape from another
+    151: "cable in a uniform current against its foot: does not come to rest",
+    191: "hose: hangs stably, comes to rest with its top turned but not stably",
+}
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [pytest.param(it, marks=pytest.mark.xfail(strict=True)) if it.name.startswith(OPEN) else it for it in SCENES],
-    ids=lambda scene: scene.name,
-)
+def scene(number):
+    marks = [pytest.mark.xfail(strict=False, reason=OPEN[number])] if number in OPEN else []
+    return pytest.param(SCENES[number], marks=marks, id=SCENES[number].name)
+
+
+@pytest.mark.parametrize("scene", [scene(number) for number in range(len(SCENES))])
 def test_a_line_finds_a_stable_equilibrium_with_its_top_hanging_and_turned(scene):
     pipe, hung, held = equilibrium(scene)
     assert hung.converged
@@ -21,3 +31,43 @@ def test_a_line_finds_a_stable_equilibrium_with_its_top_hanging_and_turned(scene
     weight = pipe.line.weight @ pipe.line.length
     if pipe.parameters.seabed is None and pipe.parameters.environment.current is None:  # what hangs is held by its ends
         assert -(held.top[2] + held.foot[2]) == pytest.approx(weight, rel=1e-6)
+
+
+TUBES = {"12 in": "P12", "16 in": "P16", "30 in": "P30"}
+
+
+def solution(number, top_angle=None):
+    """Boundary value problem of a scene; the reference must meet its own end conditions."""
+    p = SCENES[number].parameters
+    x, _, z = p.top_position
+    tube = reference.TUBES[TUBES[SCENES[number].name.split(": ")[1].split(",")[0]]]
+    current = p.environment.current
+    speed = 0.0 if current is None else current.velocity[1]
+    found = reference.solve(tube, p.length, x, -z, top_angle, p.foot, speed, p.environment.depth, p.seabed is not None, 1e-6)
+    ends = found.at([0.0, p.length])[0]
+    np.testing.assert_allclose(ends, np.array([[0.0, 0.0, 0.0], p.top_position]).T, atol=1e-5 * p.length)
+    return found
+
+
+@pytest.mark.parametrize("number", [12, 15, 24, 33, 54, 63, 72, 93, 99, 102, 105, 117])
+def test_a_hanging_line_of_the_grid_is_that_of_the_boundary_value_problem(number):
+    """12, 16 and 30 in; 300 to 3000 m; 0.3 to 0.995 of taut; bed, current, pinned foot each on and off: the top's force."""
+    _, hung, _ = equilibrium(SCENES[number])
+    force = solution(number).at([SCENES[number].parameters.length])[2][:, 0]
+    assert np.linalg.norm(hung.top[:3] - force) < 1e-4 * np.linalg.norm(force)
+
+
+@pytest.mark.parametrize("number", [24, 36, 66, 72, 78, 99, 102])
+def test_a_turned_line_of_the_grid_is_that_of_the_boundary_value_problem(number):
+    """Top section turned in the line's plane by 30 or 60 degrees either way, on a mesh made for it: the top's force, and its moment.
+
+    A short, stiff line that is pressed together (93) rests bent to either side, and which it is depends on its mesh: not among these.
+    """
+    _, hung, _ = equilibrium(SCENES[number])
+    first = rotation(hung.quaternion[-1])[:, 0]
+    angle = math.atan2(-first[2], first[0]) + SCENES[number].turn[1]
+    _, held, _ = started(replace(SCENES[number].parameters, top_quaternion=pitch(angle)))
+    _, _, force, moment, _, _ = solution(number, angle).at([SCENES[number].parameters.length])
+    assert held.stable
+    assert np.linalg.norm(held.top[:3] - force[:, 0]) < 1e-4 * np.linalg.norm(force)
+    assert held.top[4] == pytest.approx(moment[1, 0], rel=5e-3)

@@ -1,0 +1,169 @@
+"""A line at rest with its top held: forces, potential and tangent at a pose, and the corrections that follow from them."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .block_tridiagonal import condense, factorize, substitute
+from .compiled import kernel
+from .line import Array, Line, Water
+from .newton import condense_top, hold_foot, hold_foot_residual, top_correction
+from .so3 import exp, multiply, normalize
+from .stability import positive
+from .static_kernel import spin, static_system
+
+Pose = tuple[Array, Array]  # positions (n, 3) [m], attitudes (n, 4)
+
+_ROUND_OFF = 1e-12  # of the sum of absolute potentials
+_NEUTRAL = 1e-6  # of the weight over the length: about the stiffness of a hanging line
+_NEAREST = 8  # eigenvalues looked at
+_KRYLOV = 80  # vectors they are found with
+
+
+@kernel
+def _turn(quaternion, x, out):
+    """Attitudes after the spins of x (n, 6)."""
+    for i in range(x.shape[0]):
+        turned = normalize(multiply(exp((x[i, 3], x[i, 4], x[i, 5])), spin(quaternion, i)))
+        for a in range(4):
+            out[i, a] = turned[a]
+
+
+def moved(pose: Pose, move: Array) -> Pose:
+    """Positions and attitudes after the displacements and spins (n, 6)."""
+    turned = np.empty_like(pose[1])
+    _turn(pose[1], move, turned)
+    return pose[0] + move[:, :3], turned
+
+
+class Scales:
+    """What a line is measured by: `force` (6,), its weight (times its longest element for moments); `metric` (n, 6), the weight
+    at each node [N] (times its own length squared over twelve); `neutral` [1/m]: of the metric, stiffness that counts as none.
+    """
+
+    def __init__(self, line: Line) -> None:
+        weight = np.abs(line.weight * line.length)
+        longest = float(line.length.max())
+        self.force = float(weight.sum()) * np.array([1.0, 1.0, 1.0, longest, longest, longest])
+        node, length = (0.5 * (np.append(a, 0.0) + np.append(0.0, a)) for a in (weight, line.length))
+        self.metric = np.column_stack([node] * 3 + [node * length**2 / 12.0] * 3)
+        self.neutral = _NEUTRAL / float(line.length.sum())
+
+
+class Balance:
+    """Forces on a line at a pose with its top held (the top's attitude too if it is clamped).
+
+    potential [J], known to `blur`; residual (n, 6): what is not in balance, 0 where held; pull (n, 6): minus the drag in it; size: largest
+    residual over its scale; top, foot (6,): force and moment on the pipe at its ends.
+    """
+
+    def __init__(self, line: Line, water: Water, scales: Scales, pose: Pose) -> None:
+        n = len(pose[0])
+        self.line, self.water, self.scales, self.pose = line, water, scales, pose
+        self.tangent = np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6))
+        self.residual, self.pull = np.empty((n, 6)), np.empty((n, 6))
+        parts = static_system(line, water, *pose, *self.tangent, self.residual, self.pull)
+        self.potential, self.blur = sum(parts), _ROUND_OFF * sum(abs(part) for part in parts)
+        self.top, self.foot = self.residual[-1].copy(), self.residual[0].copy()
+        self.hold(self.residual)
+        self.size = float((np.abs(self.residual) / scales.force).max())
+
+    def after(self, move: Array) -> "Balance":
+        """The balance after the displacements and spins (n, 6)."""
+        return Balance(self.line, self.water, self.scales, moved(self.pose, move))
+
+    def hold(self, vector: Array) -> None:
+        """Strike what acts on the held ends from forces (n, 6)."""
+        hold_foot_residual(self.line, self.pose[1], (0.0, 0.0, 0.0), vector)
+        vector[-1, : 6 if self.line.top_clamped else 3] = 0.0
+
+    def stable(self) -> bool:
+        """Whether the line comes back when it is pushed.
+
+        It does if the symmetric part of the tangent is positive definite, however it is damped. In still water, where the tangent is
+        symmetric, this is all there is to it. The drag of a current has no potential and its part of the tangent is not symmetric; where
+        the symmetric part is not definite, the line, moving as if damped by the metric, still comes back if all eigenvalues of the
+        tangent have positive real parts (Lyapunov's first method). The eight nearest to zero are looked at.
+        """
+        return self.definite() or (bool(self.pull.any()) and self._attracting())
+
+    def definite(self, damping: float = 0.0) -> bool:
+        """Whether the symmetric part of the tangent, with `damping` [1/m] times the metric, is positive definite."""
+        return positive(self.line, self.pose[1], self.tangent, (self.scales.neutral + damping) * self.scales.metric)
+
+    def _attracting(self) -> bool:
+        factors = Factors(self, self.scales.neutral)
+
+        def undone(flat: Array) -> Array:
+            right = self.scales.metric * flat.reshape(-1, 6)
+            self.hold(right)
+            return -factors.correction(right).ravel()
+
+        nearest = _largest_eigenvalues(undone, np.ones(self.residual.size))  # of the inverse
+        return bool((nearest.real > 0.0).all())
+
+    def along(self, move: Array) -> Array:
+        """Tangent times displacements and spins (n, 6)."""
+        diagonal, lower, upper = self.tangent
+        out = np.einsum("nij,nj->ni", diagonal, move)
+        out[:-1] += np.einsum("nij,nj->ni", upper, move[1:])
+        out[1:] += np.einsum("nij,nj->ni", lower, move[:-1])
+        return out
+
+    def promise(self, move: Array) -> float:
+        """Energy [J] that displacements and spins (n, 6) release to second order."""
+        return -float((self.residual * move).sum() + 0.5 * (self.along(move) * move).sum())
+
+
+class Factors:
+    """Tangent of a balance with `damping` [1/m] times the metric, eliminated; `regular` is False where that is not possible."""
+
+    def __init__(self, balance: Balance, damping: float) -> None:
+        self.line = balance.line
+        self.diagonal, self.lower, self.upper = (block.copy() for block in balance.tangent)
+        if damping > 0.0:
+            self.diagonal[:, range(6), range(6)] += damping * balance.scales.metric
+        hold_foot(self.line, balance.pose[1], self.diagonal, self.upper)
+        self.exchanges = np.empty((len(self.lower), 6), np.int64)
+        self.regular = bool(factorize(self.diagonal, self.lower, self.upper, self.exchanges))
+
+    def correction(self, residual: Array) -> Array:
+        """Displacements and spins (n, 6) that undo a residual (n, 6), to first order."""
+        right, at_top, x = residual.copy(), np.empty(6), np.empty_like(residual)
+        condense(self.diagonal, self.lower, self.exchanges, right)
+        top_correction(self.line, self.diagonal[-1], right[-1], np.zeros(6), at_top)
+        substitute(self.upper, right, at_top, x)
+        return x
+
+    def stiffness(self) -> Array:
+        """Tangent (6, 6) at the top, the rest of the line following."""
+        out = np.empty((6, 6))
+        condense_top(self.line, self.diagonal[-1], out)
+        return out
+
+
+def _largest_eigenvalues(operator: Callable[[Array], Array], start: Array) -> NDArray[np.complex128]:
+    """The _NEAREST eigenvalues of largest modulus, by Arnoldi's method (scipy's would cost every exported unit 140 MB)."""
+    count = min(_KRYLOV, start.size)
+    basis, projected = np.zeros((count + 1, start.size)), np.zeros((count + 1, count))
+    basis[0] = start / np.linalg.norm(start)
+    for k in range(count):
+        new = operator(basis[k])
+        for _ in range(2):  # once more, for round-off
+            parts = basis[: k + 1] @ new
+            new = new - parts @ basis[: k + 1]
+            projected[: k + 1, k] += parts
+        left = float(np.linalg.norm(new))
+        if left <= np.finfo(float).eps * float(np.linalg.norm(projected[: k + 1, k])):
+            count = k + 1
+            break
+        projected[k + 1, k], basis[k + 1] = left, new / left
+    found = np.linalg.eigvals(projected[:count, :count]).astype(complex)
+    return found[np.argsort(-np.abs(found))[:_NEAREST]]
+
+
+def limited(move: Array, turn: float) -> Array:
+    """Displacements and spins (n, 6), reduced so that no section turns by more than `turn` [rad]; not finite if they are not."""
+    largest = float(np.abs(move[:, 3:]).max())
+    return move * (turn / largest) if largest > turn else move
