@@ -7,7 +7,6 @@ import numpy as np
 from .energy import energies
 from .line import Array, Line, Water
 from .newton import solve_step
-from .node_kernel import advance
 from .step_kernel import element_strains
 
 MAX_CORRECTIONS = 25
@@ -64,7 +63,7 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     spent = 0
     for guess, careful in ((2.0 * state.last - state.before, False), (state.last, True), (np.zeros_like(state.last), True)):
         limit = CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
-        converged, x, strain, force, tangent, works, iterations, residual = solve_step(
+        converged, x, *new, force, tangent, works, iterations, residual = solve_step(
             line, water, h, *old, h * guess, top, h * mobility, careful, limit
         )
         spent += iterations
@@ -74,23 +73,21 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
         force[3:] = 0.0
     if not converged:
         return StepResult(False, state, force, h * tangent, spent, residual)
-    quaternion, rate, flow = np.empty_like(state.quaternion), np.empty_like(state.rate), np.empty_like(state.flow)
-    speed = np.empty_like(state.velocity)
-    advance(line, h, state.quaternion, state.velocity, state.rate, state.flow, x, quaternion, speed, rate, flow)
-    new = PipeState(
-        time=state.time + h,
-        position=state.position + x[:, :3],
-        quaternion=quaternion,
-        velocity=speed,
-        rate=rate,
-        flow=flow,
-        strain=strain,
-        last=x / h,
-        before=state.last,
-        top_work=state.top_work + float(force @ x[-1]),
-        works=state.works + works,
+    return StepResult(
+        True,
+        PipeState(
+            state.time + h,
+            *new,
+            last=x / h,
+            before=state.last,
+            top_work=state.top_work + float(force @ x[-1]),
+            works=state.works + works,
+        ),
+        force,
+        h * tangent,
+        spent,
+        residual,
     )
-    return StepResult(True, new, force, h * tangent, spent, residual)
 
 
 def energy_of(line: Line, state: PipeState) -> tuple[float, float, float, float]:

@@ -5,9 +5,11 @@ import math
 import numpy as np
 
 from .block_tridiagonal import SIZE, condense, factorize, lu, lu_solve, lu_solve_vector, substitute
+from .columns import line_columns, take
 from .compiled import kernel
+from .node_kernel import advance
 from .so3 import dot, matrix
-from .step_kernel import step_system
+from .step_kernel import assemble, old_columns
 
 TOLERANCE = 1e-11  # of the largest element force (moment): well below any coupling tolerance
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
@@ -162,24 +164,50 @@ def _size(residual, force_scale, moment_scale, top_clamped):
 
 @kernel
 def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, mobility, careful, limit):
-    """Increments (n, 6) of one step, from `guess` (n, 6), in at most `limit` corrections.
+    """State after one step, and the increments (n, 6) of nodes to it, from the guess (n, 6) of them, in at most `limit` corrections.
+
+    Other arrays as in step_kernel.step_system, top and mobility as in `_search`. Returns (converged, increments, position, quaternion,
+    velocity, rate, flow, strain, top force (6,) on the pipe, condensed tangent (6, 6), works (6,), corrections, residual).
+    """
+    ours = line_columns(line)
+    old, new = old_columns(position, quaternion, velocity, rate, flow, strain)
+    converged, x, force, tangent, works, iterations, size = _search(
+        line, ours, water, h, quaternion, old, new, guess, top, mobility, careful, limit
+    )
+    found = np.empty_like(position), np.empty_like(quaternion), np.empty_like(velocity), np.empty_like(rate), np.empty_like(flow)
+    new_strain = np.empty_like(strain)
+    if converged:
+        columns = np.empty_like(old[1]), np.empty_like(old[2]), np.empty_like(old[3]), np.empty_like(old[4])
+        advance(ours, h, old, new[0], new[1], columns)
+        for i in range(position.shape[0]):
+            for k in range(3):
+                found[0][i, k] = position[i, k] + x[i, k]
+        take(columns[0], found[1])
+        take(columns[1], found[2])
+        take(columns[2], found[3])
+        take(columns[3], found[4])
+        take(new[2], new_strain)
+    return converged, x, *found, new_strain, force, tangent, works, iterations, size
+
+
+@kernel
+def _search(line, ours, water, h, quaternion, old, new, guess, top, mobility, careful, limit):
+    """Increments (n, 6) of one step, from `guess` (n, 6), in at most `limit` corrections; the state comes in columns (columns.py).
 
     The top's increment is `top` (6,) less mobility (6, 6) x the force on it; without a mobility it is prescribed, and met exactly; with
     one the force is still exactly that of the increment found, but the relation between the two is met to the last correction only.
 
     The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
     is made anew for every further one. A `careful` search makes it anew always, starts with a tangent of friction with which nothing
-    overshoots, and halves a correction that does not lower the residual. Returns (converged, x, new_strain, top force (6,) on the pipe,
-    condensed tangent (6, 6), works (6,), corrections, residual).
+    overshoots, and halves a correction that does not lower the residual. Returns (converged, x, top force (6,) on the pipe, condensed
+    tangent (6, 6), works (6,), corrections, residual).
     """
     n = guess.shape[0]
     system = (np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6)))
     diagonal, lower, upper, residual = system
-    old = (position, quaternion, velocity, rate, flow, strain)
     pivots = np.empty((n - 1, SIZE), np.int64)
     x = guess.copy()
     correction = np.empty((n, SIZE))
-    new_strain = np.empty(strain.shape)
     works = np.empty(6)
     tangent = np.zeros((6, 6))
     force, wanted, move = np.empty(6), np.empty(6), np.empty(6)
@@ -192,7 +220,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             prescribed = prescribed and mobility[i, j] == 0.0
     for iteration in range(limit + 1):
         sharp = not careful or size < SHARP
-        force_scale, moment_scale = step_system(line, water, h, *old, x, new_strain, fresh, sharp, system, works)
+        force_scale, moment_scale = assemble(ours, water, h, old, new, x, fresh, sharp, system, works)
         gap = 0.0
         for i in range(SIZE):
             force[i] = residual[n - 1, i]
@@ -204,7 +232,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
         lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
         done = not lost and gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous and share == 1.0))
         if done and iteration > 0:
-            return True, x, new_strain, force, tangent, works, iteration, size
+            return True, x, force, tangent, works, iteration, size
         if careful and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
             share *= 0.5
             _move(x, -share, correction)
@@ -221,7 +249,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             fresh, keep = True, size <= SLOW * previous
             continue
         if done:
-            return True, x, new_strain, force, tangent, works, iteration, size
+            return True, x, force, tangent, works, iteration, size
         fresh = careful or not keep
         condense(diagonal, lower, pivots, residual)
         if prescribed:
@@ -236,7 +264,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             if prescribed and (line.top_clamped or i < 3):
                 x[n - 1, i] = top[i]
         previous = size
-    return False, x, new_strain, force, tangent, works, limit, size
+    return False, x, force, tangent, works, limit, size
 
 
 @kernel

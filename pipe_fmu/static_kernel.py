@@ -2,26 +2,30 @@
 
 import numpy as np
 
-from .assembly import add_matrix, add_outer, add_vector, clear, expand, expand_matrix
+from .assembly import add_matrix, add_vector, clear, expand, expand_matrix
+from .columns import columns, fill_straight, line_columns, room
 from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, strains
+from .lanes import WIDTH, grid, group, lane, row, total
 from .loads import add_contact, add_drag
 
 
 @inner
-def chord(position, e):
-    """phi_2 - phi_1 of element e."""
-    return (
-        position[e + 1, 0] - position[e, 0],
-        position[e + 1, 1] - position[e, 1],
-        position[e + 1, 2] - position[e, 2],
-    )
+def vector_of(columns, k, at):
+    """Components k, k + 1, k + 2 of columns at a node or a group of nodes."""
+    return (columns[k, at], columns[k + 1, at], columns[k + 2, at])
 
 
 @inner
-def spin(quaternion, i):
-    """Quaternion of node i as a tuple."""
-    return (quaternion[i, 0], quaternion[i, 1], quaternion[i, 2], quaternion[i, 3])
+def attitude(quaternion, at):
+    """Quaternion, from columns, of a node or a group of nodes."""
+    return (quaternion[0, at], quaternion[1, at], quaternion[2, at], quaternion[3, at])
+
+
+@inner
+def chord(position, a, b):
+    """phi_b - phi_a from columns of positions, or of displacements."""
+    return (position[0, b] - position[0, a], position[1, b] - position[1, a], position[2, b] - position[2, a])
 
 
 @kernel
@@ -30,48 +34,58 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
 
     position (n, 3), quaternion (n, 4). Returns the potentials (elastic, gravity, contact) [J]; the drag of the current has none.
     """
+    n = position.shape[0]
+    positions, quaternions = np.empty((3, room(n))), columns(quaternion, n, 1.0)
+    fill_straight(position, positions)
     clear(diagonal, lower, upper)
     residual[:] = 0.0
-    strain = np.empty(ROWS)
-    rows = np.empty((ROWS, 9))
-    stress = np.empty(ROWS)
-    nine = np.empty(9)
-    square = np.empty((9, 9))
-    vector = np.empty(12)
-    matrix = np.empty((12, 12))
-    still = np.zeros((2, 6))
-    depths = np.empty(2)
-    scratch = np.empty((2, 3, 12))
+    return _assemble(line_columns(line), water, n, positions, quaternions, (diagonal, lower, upper, residual))
+
+
+@inner
+def _assemble(line, water, n, position, quaternion, system):
+    """`static_system` on columns (columns.py)."""
     elastic, gravity, pressed = 0.0, 0.0, 0.0
-    for e in range(line.length.shape[0]):
-        h = line.length[e]
-        rm, u, psi = frame(spin(quaternion, e), spin(quaternion, e + 1), chord(position, e))
-        strains(rm, u, psi, h, line.share[e], strain)
-        gradients(rm, u, psi, h, line.share[e], rows)
+    diagonal, lower, upper, residual = system
+    for first in range(0, n - 1, WIDTH):
+        a, b, count = group(first), group(first + 1), min(WIDTH, n - 1 - first)
+        strain, stress, nine, vector = row(7), row(7), row(9), row(12)
+        rows, square, matrix, still, drags = grid(7, 9), grid(9, 9), grid(12, 12), grid(2, 6), (grid(3, 12), grid(3, 12))
+        h, share = line.length[a], (line.share[0, a], line.share[1, a])
+        rm, u, psi = frame(attitude(quaternion, a), attitude(quaternion, b), chord(position, a, b))
+        strains(rm, u, psi, h, share, strain)
+        gradients(rm, u, psi, h, share, rows)
         for k in range(STRAINS):
-            stress[k] = h * line.stiffness[e, k] * strain[k]
-            elastic += 0.5 * stress[k] * strain[k]
-        weight = h * line.weight[e]
+            stress[k] = h * line.stiffness[k, a] * strain[k]
+            elastic += 0.5 * total(stress[k] * strain[k])
+        weight = h * line.weight[a]
         stress[STRAINS] = -weight / 6.0
-        gravity -= weight * (0.5 * (position[e, 2] + position[e + 1, 2]) + strain[STRAINS] / 6.0)
-        nine[:] = 0.0
-        for k in range(ROWS):
-            for i in range(9):
+        gravity -= total(weight * (0.5 * (position[2, a] + position[2, b]) + strain[STRAINS] / 6.0))
+        geometric_stiffness(rm, u, psi, h, share, stress, square)
+        for i in range(9):
+            nine[i] = 0.0
+            for k in range(ROWS):
                 nine[i] += stress[k] * rows[k, i]
-        geometric_stiffness(rm, u, psi, h, line.share[e], stress, square)
-        for k in range(STRAINS):
-            add_outer(square, h * line.stiffness[e, k], rows[k], rows[k])
+            for k in range(STRAINS):
+                push = h * line.stiffness[k, a] * rows[k, i]
+                for j in range(9):
+                    square[i, j] += push * rows[k, j]
         expand(nine, vector)
         expand_matrix(square, matrix)
         vector[2] -= 0.5 * weight
         vector[8] -= 0.5 * weight
-        depths[0], depths[1] = position[e, 2], position[e + 1, 2]
         if water.drag and water.levels.shape[0] > 0:
-            add_drag(rm, u, psi, h, line.drag[e], still, depths, water.levels, water.velocities, 0.0, True, vector, matrix, scratch)
-        if line.bed.shape[0] > 0:
-            pressed += add_contact(
-                h, line.diameter[e], line.weight[e], depths[0], depths[1], strain[STRAINS], rows[STRAINS], vector, matrix, scratch
-            )
-        add_vector(residual, e, vector)
-        add_matrix(diagonal, lower, upper, e, matrix)
+            for i in range(6):
+                still[0, i] = 0.0
+                still[1, i] = 0.0
+            depths, coefficients = (position[2, a], position[2, b]), (line.drag[0, a], line.drag[1, a])
+            add_drag(rm, u, psi, h, coefficients, still, depths, water.levels, water.velocities, 0.0, True, vector, matrix, drags)
+        for m in range(count):
+            e = first + m
+            ours, block = lane(vector, m), lane(matrix, m)
+            if line.bed.shape[0] > 0:
+                lies = line.length[e], line.diameter[e], line.weight[e], position[2, e], position[2, e + 1]
+                pressed += add_contact(*lies, lane(strain, m)[STRAINS], lane(rows, m)[STRAINS], ours, block, (lane(drags[0], m),))
+            add_vector(residual, e, ours)
+            add_matrix(diagonal, lower, upper, e, block)
     return elastic, gravity, pressed

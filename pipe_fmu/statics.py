@@ -16,7 +16,7 @@ from .line import Array, Line, Water
 from .newton import LOST, condense_top, hold_foot, hold_foot_residual, top_correction
 from .so3 import conjugate, exp, log, multiply, normalize, scale
 from .stability import positive
-from .static_kernel import spin, static_system
+from .static_kernel import static_system
 
 TOLERANCE = 1e-11  # of the line's weight (times its longest element, for moments)
 ROUND_OFF = 1e-7  # accepted once the residual no longer falls
@@ -48,7 +48,8 @@ class Equilibrium(NamedTuple):
 def _turn(quaternion, x, out):
     """Attitudes after the spins of x (n, 6)."""
     for i in range(x.shape[0]):
-        turned = normalize(multiply(exp((x[i, 3], x[i, 4], x[i, 5])), spin(quaternion, i)))
+        old = (quaternion[i, 0], quaternion[i, 1], quaternion[i, 2], quaternion[i, 3])
+        turned = normalize(multiply(exp((x[i, 3], x[i, 4], x[i, 5])), old))
         for a in range(4):
             out[i, a] = turned[a]
 
