@@ -4,6 +4,7 @@
 
     at = group(first)           the entries first, first + 1, ... of the last axis of a C-contiguous array
     a[k, at]                    their Lanes, read or written; all WIDTH of them must be there
+    a[k, six(0)]                the same of six entries: lanes too, for the rows of a node's block
     row(7), grid(7, 9)          scratch of Lanes on the stack, of a size given in literal numbers: out[k, i] is Lanes, out[k] a row
     lane(out, 3)                the same scratch as the numbers in lane 3; of Lanes, the number
 
@@ -26,15 +27,16 @@ WIDTH = 8
 
 _I64 = ir.IntType(64)
 _DOUBLE = ir.DoubleType()
-_VECTOR = ir.VectorType(_DOUBLE, WIDTH)
 _BYTES = 8  # of a double
 
 
 class _Lanes(types.Type):
-    """WIDTH doubles."""
+    """Doubles side by side."""
 
-    def __init__(self) -> None:
-        super().__init__(name=f"Lanes{WIDTH}")
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self.machine = ir.VectorType(_DOUBLE, width)
+        super().__init__(name=f"Lanes{width}")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
         return Conversion.unsafe if isinstance(other, types.Number) else None
@@ -44,10 +46,11 @@ class _Lanes(types.Type):
 
 
 class _Group(types.Type):
-    """The first of WIDTH consecutive entries."""
+    """The first of consecutive entries."""
 
-    def __init__(self) -> None:
-        super().__init__(name="Group")
+    def __init__(self, taken: _Lanes) -> None:
+        self.taken = taken
+        super().__init__(name=f"Group of {taken}")
 
 
 class _Scratch(types.Type):
@@ -57,24 +60,14 @@ class _Scratch(types.Type):
         self.item, self.shape = item, shape
         super().__init__(name=f"Scratch{WIDTH}({item}, {shape})")
 
-    @property
-    def step(self) -> int:
-        """Doubles from one item to the next."""
-        return WIDTH
 
-    @property
-    def entry(self) -> Any:
-        """Machine type of an item."""
-        return _VECTOR if self.item == lanes else _DOUBLE
-
-
-lanes, _group = _Lanes(), _Group()
+lanes, sextet = _Lanes(WIDTH), _Lanes(6)
 
 
 @register_model(_Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, _VECTOR)
+        super().__init__(dmm, fe_type, fe_type.machine)
 
 
 @register_model(_Group)
@@ -89,14 +82,14 @@ class _ScratchModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, _DOUBLE.as_pointer())
 
 
-def _splat(builder: Any, value: Any) -> Any:
-    one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), value, _I64(0))
-    return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
+def _splat(builder: Any, kind: _Lanes, value: Any) -> Any:
+    one = builder.insert_element(ir.Constant(kind.machine, ir.Undefined), value, _I64(0))
+    return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(ir.IntType(32), kind.width), [0] * kind.width))
 
 
 @lower_cast(types.Number, _Lanes)
 def _number_to_lanes(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
-    return _splat(builder, context.cast(builder, value, fromty, types.float64))
+    return _splat(builder, toty, context.cast(builder, value, fromty, types.float64))
 
 
 # Arithmetic
@@ -108,18 +101,20 @@ def _arithmetic(function: Any, count: int, build: Any) -> None:
     @infer_global(function)
     class _Typing(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            fits = len(args) == count and any(a == lanes for a in args) and all(a == lanes or isinstance(a, types.Number) for a in args)
-            return signature(lanes, *[lanes] * count) if fits else None
+            kinds = {a for a in args if isinstance(a, _Lanes)}
+            fits = len(args) == count and len(kinds) == 1 and all(isinstance(a, _Lanes | types.Number) for a in args)
+            return signature(*[*kinds] * (count + 1)) if fits else None
 
-    lower_builtin(function, *[lanes] * count)(lambda context, builder, sig, args: build(builder, *args))
+    lower_builtin(function, *[_Lanes] * count)(lambda context, builder, sig, args: build(builder, *args))
 
 
 def _named(name: str) -> Any:
     """Builder of a call of LLVM's function `name` of vectors."""
 
     def build(builder: Any, *args: Any) -> Any:
-        kind = ir.FunctionType(_VECTOR, [_VECTOR] * len(args))
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{WIDTH}f64"), args)
+        kind = args[0].type
+        declared = ir.FunctionType(kind, [kind] * len(args))
+        return builder.call(cgutils.get_or_insert_function(builder.module, declared, f"llvm.{name}.v{kind.count}f64"), args)
 
     return build
 
@@ -141,13 +136,25 @@ _arithmetic(min, 2, _named("minnum"))
 @intrinsic
 def group(typingctx, first):
     """The WIDTH entries from `first` on."""
-    return _group(first), lambda context, builder, sig, args: context.cast(builder, args[0], sig.args[0], types.intp)
+    return _Group(lanes)(first), lambda context, builder, sig, args: context.cast(builder, args[0], sig.args[0], types.intp)
+
+
+@intrinsic
+def six(typingctx, first):
+    """Six entries from `first` on."""
+    return _Group(sextet)(first), lambda context, builder, sig, args: context.cast(builder, args[0], sig.args[0], types.intp)
 
 
 @intrinsic(prefer_literal=True)
 def row(typingctx, n):
     """Scratch of n Lanes, n a literal number; it lives as long as the function that asks for it."""
     return _Scratch(lanes, (n.literal_value,))(n), _stack
+
+
+@intrinsic(prefer_literal=True)
+def rows_of_six(typingctx, n):
+    """Scratch of n rows of six numbers, as `row` is one of n Lanes."""
+    return _Scratch(sextet, (n.literal_value,))(n), _stack
 
 
 @intrinsic(prefer_literal=True)
@@ -158,7 +165,7 @@ def grid(typingctx, m, n):
 
 def _stack(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     with builder.goto_entry_block():
-        place = builder.alloca(_VECTOR, _I64(math.prod(sig.return_type.shape)))
+        place = builder.alloca(lanes.machine, _I64(math.prod(sig.return_type.shape)))
     place.align = WIDTH * _BYTES
     return builder.bitcast(place, _DOUBLE.as_pointer())
 
@@ -175,25 +182,26 @@ def _item(target: Any, index: Any) -> Any:
     if not all(isinstance(part, types.Integer) for part in rest):
         return None
     if isinstance(target, types.Array) and target.layout == "C" and target.dtype == types.float64:
-        return (lanes, _index(len(rest), _group)) if last == _group and len(rest) + 1 == target.ndim else None
+        fits = isinstance(last, _Group) and len(rest) + 1 == target.ndim
+        return (last.taken, _index(len(rest), last)) if fits else None
     if not isinstance(target, _Scratch) or not isinstance(last, types.Integer) or len(rest) >= len(target.shape):
         return None
     left = target.shape[len(rest) + 1 :]
     return _Scratch(target.item, left) if left else target.item, _index(len(rest) + 1, None)
 
 
-def _place(context: Any, builder: Any, target: Any, value: Any, kind: Any, index: Any) -> Any:
+def _place(context: Any, builder: Any, item: Any, target: Any, value: Any, kind: Any, index: Any) -> Any:
     """Address of an item."""
     flat, *numbers = cgutils.unpack_tuple(builder, index) if isinstance(kind, types.BaseTuple) else [index]
     if isinstance(target, types.Array):
         array = context.make_array(target)(context, builder, value)
-        sizes, start, entry = cgutils.unpack_tuple(builder, array.shape)[1:], array.data, _VECTOR
+        sizes, start = cgutils.unpack_tuple(builder, array.shape)[1:], array.data
     else:
-        sizes, start, entry = [_I64(n) for n in (*target.shape[1:], WIDTH)], value, target.entry
+        sizes, start = [_I64(n) for n in (*target.shape[1:], WIDTH)], value
         numbers += [_I64(0)] * (len(sizes) - len(numbers))
     for number, size in zip(numbers, sizes, strict=True):
         flat = builder.add(builder.mul(flat, size), number)
-    return builder.bitcast(builder.gep(start, [flat]), entry.as_pointer())
+    return builder.bitcast(builder.gep(start, [flat]), (item.machine if isinstance(item, _Lanes) else _DOUBLE).as_pointer())
 
 
 @infer_global(operator.getitem)
@@ -213,22 +221,22 @@ class _SetItem(AbstractTemplate):
 
 
 def _get_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    place = _place(context, builder, sig.args[0], args[0], sig.args[1], args[1])
-    if isinstance(sig.return_type, _Scratch):
-        return builder.bitcast(place, _DOUBLE.as_pointer())
-    return builder.load(place, align=_BYTES)
+    place = _place(context, builder, sig.return_type, sig.args[0], args[0], sig.args[1], args[1])
+    return place if isinstance(sig.return_type, _Scratch) else builder.load(place, align=_BYTES)
 
 
 def _set_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    place = _place(context, builder, sig.args[0], args[0], sig.args[1], args[1])
+    place = _place(context, builder, sig.args[2], sig.args[0], args[0], sig.args[1], args[1])
     builder.store(args[2], place, align=_BYTES)
 
 
-for _target, _last in ((types.Array, _group), (_Scratch, None)):
-    for _count in range(_last is None, 4):
-        lower_builtin(operator.getitem, _target, _index(_count, _last))(_get_item)
-        lower_builtin(operator.setitem, _target, _index(_count, _last), lanes)(_set_item)
-        lower_builtin(operator.setitem, _target, _index(_count, _last), types.float64)(_set_item)
+for _count in range(4):
+    for _taken in (lanes, sextet):
+        lower_builtin(operator.getitem, types.Array, _index(_count, _Group(_taken)))(_get_item)
+        lower_builtin(operator.setitem, types.Array, _index(_count, _Group(_taken)), _taken)(_set_item)
+    if _count:
+        lower_builtin(operator.getitem, _Scratch, _index(_count, None))(_get_item)
+        lower_builtin(operator.setitem, _Scratch, _index(_count, None), types.Any)(_set_item)
 
 
 @intrinsic
@@ -241,9 +249,9 @@ def lane(typingctx, a, k):
     def numbers(context, builder, sig, args):
         return builder.gep(args[0], [context.cast(builder, args[1], sig.args[1], types.intp)])
 
-    if isinstance(a, _Scratch) and a.item == lanes:
+    if isinstance(a, _Scratch) and isinstance(a.item, _Lanes):
         return _Scratch(types.float64, a.shape)(a, k), numbers
-    return (types.float64(a, k), number) if a == lanes else None
+    return (types.float64(a, k), number) if isinstance(a, _Lanes) else None
 
 
 # Lanes one by one
@@ -258,7 +266,7 @@ def _put_lane(typingctx, out, k, value):
         k = context.cast(builder, args[1], sig.args[1], types.intp)
         numbers = cgutils.unpack_tuple(builder, args[2]) if many else [args[2]]
         if sig.args[0] == types.none:
-            made = [_splat(builder, number) for number in numbers]
+            made = [_splat(builder, lanes, number) for number in numbers]
         else:
             before = cgutils.unpack_tuple(builder, args[0]) if many else [args[0]]
             made = [builder.insert_element(vector, number, k) for vector, number in zip(before, numbers, strict=True)]
@@ -353,6 +361,6 @@ def _above(a, bound):
 @intrinsic
 def _exceeds(typingctx, a, bound):
     def build(context, builder, sig, args):
-        return builder.uitofp(builder.fcmp_ordered(">", *args), _VECTOR)
+        return builder.uitofp(builder.fcmp_ordered(">", *args), lanes.machine)
 
     return lanes(lanes, lanes), build

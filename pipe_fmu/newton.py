@@ -205,7 +205,6 @@ def _search(line, ours, water, h, quaternion, old, new, guess, top, mobility, ca
     n = guess.shape[0]
     system = (np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6)))
     diagonal, lower, upper, residual = system
-    pivots = np.empty((n - 1, SIZE), np.int64)
     x = guess.copy()
     correction = np.empty((n, SIZE))
     works = np.empty(6)
@@ -242,7 +241,7 @@ def _search(line, ours, water, h, quaternion, old, new, guess, top, mobility, ca
             break
         if fresh:
             hold_foot(line, quaternion, diagonal, upper)
-            if not factorize(diagonal, lower, upper, pivots):
+            if not factorize(diagonal, lower, upper):
                 break
             condense_top(line, diagonal[n - 1], tangent)
         elif size > SLOW * previous or size > NEAR:
@@ -251,14 +250,14 @@ def _search(line, ours, water, h, quaternion, old, new, guess, top, mobility, ca
         if done:
             return True, x, force, tangent, works, iteration, size
         fresh = careful or not keep
-        condense(diagonal, lower, pivots, residual)
+        condense(lower, residual)
         if prescribed:
             fine = top_correction(line, diagonal[n - 1], residual[n - 1], wanted, move)
         else:
             fine = yielding(line, diagonal[n - 1], residual[n - 1], tangent, wanted, mobility, move)
         if not fine:
             break
-        substitute(upper, residual, move, correction)
+        substitute(diagonal, upper, residual, move, correction)
         _move(x, 1.0, correction)
         for i in range(SIZE):
             if prescribed and (line.top_clamped or i < 3):

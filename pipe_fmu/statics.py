@@ -61,7 +61,6 @@ class _System:
         n = len(line.length) + 1
         self.line, self.water = line, water
         self.blocks = np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6))
-        self.exchanges = np.empty((n - 1, 6), np.int64)
         self.scales = np.array([force_scale] * 3 + [moment_scale] * 3)
         self.held = 6 if line.top_clamped else 3
 
@@ -81,9 +80,9 @@ class _System:
         diagonal, lower, upper, residual = self.blocks
         if damping > 0.0:
             diagonal[1:, range(6), range(6)] += damping * self.scales
-        if not factorize(diagonal, lower, upper, self.exchanges):
+        if not factorize(diagonal, lower, upper):
             return False
-        condense(diagonal, lower, self.exchanges, residual)
+        condense(lower, residual)
         return True
 
     def correction(self) -> Array | None:
@@ -92,7 +91,7 @@ class _System:
         at_top, x = np.empty(6), np.empty_like(residual)
         if not top_correction(self.line, diagonal[-1], residual[-1], np.zeros(6), at_top):
             return None
-        substitute(upper, residual, at_top, x)
+        substitute(diagonal, upper, residual, at_top, x)
         largest = float(np.abs(x[:, 3:]).max())
         return x * (_LARGEST_TURN / largest) if largest > _LARGEST_TURN else x
 
