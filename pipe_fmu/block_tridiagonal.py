@@ -13,7 +13,7 @@ from .compiled import inner, kernel
 from .lanes import lane, rows_of_six, six
 
 SIZE = 6
-_SHRUNK = 1e-8  # of the largest entry of its column: a pivot for which rows are exchanged
+_SHRUNK = 1e-4  # of the largest entry of its column: a pivot for which rows are exchanged
 
 
 @inner

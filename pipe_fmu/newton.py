@@ -9,11 +9,14 @@ from .columns import line_columns, take
 from .compiled import kernel
 from .node_kernel import advance
 from .so3 import dot, matrix
+from .state import PipeState
 from .step_kernel import assemble, old_columns
 
 TOLERANCE = 1e-11  # of the largest element force (moment): well below any coupling tolerance
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
 NEAR = 1e-5  # residual from which on a tangent is kept
+MAX_CORRECTIONS = 25
+CAREFUL_CORRECTIONS = 100
 SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
 SHARP = 1e-3  # residual below which a careful search takes Newton's tangent of friction
 LEAST_SHARE = 0.02  # of a correction: a careful search halves no further
@@ -163,53 +166,73 @@ def _size(residual, force_scale, moment_scale, top_clamped):
 
 
 @kernel
-def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, mobility, careful, limit):
-    """State after one step, and the increments (n, 6) of nodes to it, from the guess (n, 6) of them, in at most `limit` corrections.
+def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful):
+    """One step from a guess of its mean velocities: the sum of those of the last three steps times `weights`.
 
-    Other arrays as in step_kernel.step_system, top and mobility as in `_search`. Returns (converged, increments, position, quaternion,
-    velocity, rate, flow, strain, top force (6,) on the pipe, condensed tangent (6, 6), works (6,), corrections, residual).
+    velocity, spin (3,), mobility (6, 6): see integrator.step; careful: see `_search`. Returns (converged, new state, force on the pipe's
+    top (6,), its derivative by the mean velocity (6, 6), corrections, residual); when not converged the state is the old one.
     """
+    n = state.position.shape[0]
     ours = line_columns(line)
-    old, new = old_columns(position, quaternion, velocity, rate, flow, strain)
-    converged, x, force, tangent, works, iterations, size = _search(
-        line, ours, water, h, quaternion, old, new, guess, top, mobility, careful, limit
-    )
-    found = np.empty_like(position), np.empty_like(quaternion), np.empty_like(velocity), np.empty_like(rate), np.empty_like(flow)
-    new_strain = np.empty_like(strain)
-    if converged:
-        columns = np.empty_like(old[1]), np.empty_like(old[2]), np.empty_like(old[3]), np.empty_like(old[4])
-        advance(ours, h, old, new[0], new[1], columns)
-        for i in range(position.shape[0]):
-            for k in range(3):
-                found[0][i, k] = position[i, k] + x[i, k]
-        take(columns[0], found[1])
-        take(columns[1], found[2])
-        take(columns[2], found[3])
-        take(columns[3], found[4])
-        take(new[2], new_strain)
-    return converged, x, *found, new_strain, force, tangent, works, iterations, size
+    old, new = old_columns(state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain)
+    x, top, works = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
+    for k in range(3):
+        top[k], top[3 + k] = h * velocity[k], h * spin[k]
+    for i in range(n):
+        for k in range(SIZE):
+            guess = weights[0] * state.last[i, k] + weights[1] * state.before[i, k] + weights[2] * state.earlier[i, k]
+            x[i, k] = h * guess
+    force, tangent = np.empty(SIZE), np.zeros((SIZE, SIZE))
+    converged, iterations, size = _search(line, ours, water, h, state.quaternion, old, new, x, top, h * mobility, careful, force, tangent, works)
+    for i in range(3 if not line.top_clamped else 0):
+        force[3 + i] = 0.0
+    found = _advanced(ours, h, state, old, new, x, force, works) if converged else state
+    return converged, found, force, h * tangent, iterations, size
 
 
 @kernel
-def _search(line, ours, water, h, quaternion, old, new, guess, top, mobility, careful, limit):
-    """Increments (n, 6) of one step, from `guess` (n, 6), in at most `limit` corrections; the state comes in columns (columns.py).
+def _advanced(line, h, state, old, new, x, force, works):
+    """State after the increments x (n, 6); line and old state, and attitudes and strains on the way, in columns."""
+    fields = np.empty_like(old[1]), np.empty_like(old[2]), np.empty_like(old[3]), np.empty_like(old[4])
+    advance(line, h, old, new[0], new[1], fields)
+    position, last = np.empty_like(state.position), np.empty_like(x)
+    quaternion, velocity, rate = np.empty_like(state.quaternion), np.empty_like(state.velocity), np.empty_like(state.rate)
+    flow, strain = np.empty_like(state.flow), np.empty_like(state.strain)
+    for i in range(x.shape[0]):
+        for k in range(3):
+            position[i, k] = state.position[i, k] + x[i, k]
+        for k in range(SIZE):
+            last[i, k] = x[i, k] / h
+    take(fields[0], quaternion)
+    take(fields[1], velocity)
+    take(fields[2], rate)
+    take(fields[3], flow)
+    take(new[2], strain)
+    top_work = state.top_work
+    for k in range(SIZE):
+        top_work += force[k] * x[-1, k]
+        works[k] += state.works[k]
+    return PipeState(
+        state.time + h, position, quaternion, velocity, rate, flow, strain, last, state.last, state.before, top_work, works
+    )
+
+
+@kernel
+def _search(line, ours, water, h, quaternion, old, new, x, top, mobility, careful, force, tangent, works):
+    """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (columns.py).
 
     The top's increment is `top` (6,) less mobility (6, 6) x the force on it; without a mobility it is prescribed, and met exactly; with
     one the force is still exactly that of the increment found, but the relation between the two is met to the last correction only.
 
     The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
     is made anew for every further one. A `careful` search makes it anew always, starts with a tangent of friction with which nothing
-    overshoots, and halves a correction that does not lower the residual. Returns (converged, x, top force (6,) on the pipe, condensed
-    tangent (6, 6), works (6,), corrections, residual).
+    overshoots, and halves a correction that does not lower the residual. Fills the force on the pipe's top (6,), the tangent (6, 6) as the
+    top feels it and the works (6,). Returns (converged, corrections, residual).
     """
-    n = guess.shape[0]
+    n, limit = x.shape[0], CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
     system = (np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6)))
     diagonal, lower, upper, residual = system
-    x = guess.copy()
-    correction = np.empty((n, SIZE))
-    works = np.empty(6)
-    tangent = np.zeros((6, 6))
-    force, wanted, move = np.empty(6), np.empty(6), np.empty(6)
+    correction, wanted, move = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
     fresh, keep = True, True
@@ -231,7 +254,7 @@ def _search(line, ours, water, h, quaternion, old, new, guess, top, mobility, ca
         lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
         done = not lost and gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous and share == 1.0))
         if done and iteration > 0:
-            return True, x, force, tangent, works, iteration, size
+            return True, iteration, size
         if careful and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
             share *= 0.5
             _move(x, -share, correction)
@@ -248,7 +271,7 @@ def _search(line, ours, water, h, quaternion, old, new, guess, top, mobility, ca
             fresh, keep = True, size <= SLOW * previous
             continue
         if done:
-            return True, x, force, tangent, works, iteration, size
+            return True, iteration, size
         fresh = careful or not keep
         condense(lower, residual)
         if prescribed:
@@ -263,7 +286,7 @@ def _search(line, ours, water, h, quaternion, old, new, guess, top, mobility, ca
             if prescribed and (line.top_clamped or i < 3):
                 x[n - 1, i] = top[i]
         previous = size
-    return False, x, force, tangent, works, limit, size
+    return False, limit, size
 
 
 @kernel
