@@ -91,7 +91,9 @@ def _invert_with_exchange(a):
     factors, pivots = a.copy(), np.empty(SIZE, np.int64)
     if not lu(factors, pivots):
         return False
-    a[:] = np.eye(SIZE)
+    for i in range(SIZE):
+        for j in range(SIZE):
+            a[i, j] = 1.0 if i == j else 0.0
     lu_solve(factors, pivots, a)
     return True
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .block_tridiagonal import SIZE, condense, factorize, lu, lu_solve, lu_solve_vector, substitute
 from .columns import line_columns, take
-from .compiled import kernel
+from .compiled import inner, kernel
 from .node_kernel import advance
 from .so3 import dot, matrix
 from .state import PipeState
@@ -23,14 +23,14 @@ LEAST_SHARE = 0.02  # of a correction: a careful search halves no further
 LOST = 1e12  # residual, and element force over the axial stiffness, from which there is no way back
 
 
-@kernel
+@inner
 def _axis(quaternion):
     """Direction t1 of the foot."""
     rm = matrix((quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3]))
     return (rm[0][0], rm[1][0], rm[2][0])
 
 
-@kernel
+@inner
 def hold_foot(line, quaternion, diagonal, upper):
     """Impose the foot on the tangent: clamped, or pinned (position held, no spin about t1, so that the line's twist is determined)."""
     block, coupling = diagonal[0], upper[0]
@@ -52,7 +52,7 @@ def hold_foot(line, quaternion, diagonal, upper):
                 block[3 + i, j] += stiffness * axis[i] * axis[j - 3]
 
 
-@kernel
+@inner
 def hold_foot_residual(line, quaternion, theta, residual):
     """Impose the foot on the residual; `theta` its trial rotation."""
     for i in range(SIZE if line.foot_clamped else 3):
@@ -150,16 +150,16 @@ def condense_top(line, block, out):
                     out[i, j] -= block[i, 3 + k] * sides[k, j]
 
 
-@kernel
+@inner
 def _size(residual, force_scale, moment_scale, top_clamped):
     """Largest free residual over its scale."""
     worst = 0.0
     n = residual.shape[0]
-    for i in range(n):
-        for j in range(SIZE):
-            if i == n - 1 and (top_clamped or j < 3):
-                continue
-            ratio = math.fabs(residual[i, j]) / (force_scale if j < 3 else moment_scale)
+    for i in range(n if not top_clamped else n - 1):
+        held = i == n - 1
+        for j in range(3):
+            force = 0.0 if held else math.fabs(residual[i, j]) / force_scale
+            ratio = max(force, math.fabs(residual[i, 3 + j]) / moment_scale)
             if not ratio <= worst:
                 worst = ratio
     return worst
@@ -183,7 +183,10 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful
             guess = weights[0] * state.last[i, k] + weights[1] * state.before[i, k] + weights[2] * state.earlier[i, k]
             x[i, k] = h * guess
     force, tangent = np.empty(SIZE), np.zeros((SIZE, SIZE))
-    converged, iterations, size = _search(line, ours, water, h, state.quaternion, old, new, x, top, h * mobility, careful, force, tangent, works)
+    system = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n, SIZE))
+    scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
+    ends = state.quaternion, h * mobility, top, force, tangent
+    converged, iterations, size = _search(line, ours, water, h, old, new, x, careful, works, ends, system, scratch)
     for i in range(3 if not line.top_clamped else 0):
         force[3 + i] = 0.0
     found = _advanced(ours, h, state, old, new, x, force, works) if converged else state
@@ -212,13 +215,11 @@ def _advanced(line, h, state, old, new, x, force, works):
     for k in range(SIZE):
         top_work += force[k] * x[-1, k]
         works[k] += state.works[k]
-    return PipeState(
-        state.time + h, position, quaternion, velocity, rate, flow, strain, last, state.last, state.before, top_work, works
-    )
+    return PipeState(state.time + h, position, quaternion, velocity, rate, flow, strain, last, state.last, state.before, top_work, works)
 
 
 @kernel
-def _search(line, ours, water, h, quaternion, old, new, x, top, mobility, careful, force, tangent, works):
+def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scratch):
     """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (columns.py).
 
     The top's increment is `top` (6,) less mobility (6, 6) x the force on it; without a mobility it is prescribed, and met exactly; with
@@ -228,11 +229,13 @@ def _search(line, ours, water, h, quaternion, old, new, x, top, mobility, carefu
     is made anew for every further one. A `careful` search makes it anew always, starts with a tangent of friction with which nothing
     overshoots, and halves a correction that does not lower the residual. Fills the force on the pipe's top (6,), the tangent (6, 6) as the
     top feels it and the works (6,). Returns (converged, corrections, residual).
+
+    ends: quaternions (n, 4), mobility, top, force, tangent; system: as in step_kernel.assemble; scratch: (n, 6), (6,), (6,).
     """
+    quaternion, mobility, top, force, tangent = ends
+    correction, wanted, move = scratch
     n, limit = x.shape[0], CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
-    system = (np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6)))
     diagonal, lower, upper, residual = system
-    correction, wanted, move = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
     fresh, keep = True, True
@@ -289,7 +292,7 @@ def _search(line, ours, water, h, quaternion, old, new, x, top, mobility, carefu
     return False, limit, size
 
 
-@kernel
+@inner
 def _move(x, share, correction):
     """x += share * correction."""
     for k in range(x.shape[0]):
