@@ -62,7 +62,7 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
     """Drag on one element into `vector` (12,) (minus the force on the pipe) and, if `fresh`, its tangent into `matrix` (12, 12).
 
     rm, u, psi: frame, chord in it and relative rotation; `ends` (2, 6) velocities (v, w) of the nodes; `depths` (2,) their z;
-    `rate` = d velocity / d unknown [1/s], 0 in statics; the rotation of t1 is weighted 1 in statics, 1/2 in a step. `scratch`: two of (3, 12).
+    `rate` = d velocity / d unknown [1/s], 0 in statics; the rotation of t1 is weighted 1 in statics, 1/2 in a step. scratch: two (3, 12).
     Returns (power dissipated >= 0, power supplied by the current) [W].
     """
     d = apply(rm, u)
@@ -120,7 +120,7 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
 
 @inner
 def add_contact(h, diameter, weight, z1, z2, sag, sag_row, vector, matrix, scratch):
-    """Static reaction of the bed on one element; `sag_row` (9,) gradient of the sag; `scratch`: one of (3, 12). Returns its potential [J]."""
+    """Static reaction of the bed on one element; `sag_row` (9,) gradient of the sag; scratch: one (3, 12). Returns its potential [J]."""
     potential = 0.0
     row = scratch[0][0]
     for k in range(4):

@@ -1,7 +1,8 @@
 """What a step does at the nodes: inertia of lumped mass and section, rotational damping, added mass; and the state after it."""
 
 from .compiled import inner
-from .lanes import WIDTH, grid, group, lane, row
+from .lane_arrays import grid, group, lane, row
+from .lanes import WIDTH
 from .so3 import (
     add,
     apply,
@@ -142,7 +143,7 @@ def _add_added_mass(m, h, flow, r_mid, spin_t, arm, arm_new, move, fresh, block,
 
 @inner
 def advance(line, h, old, moves, turned, new):
-    """Columns `new` of attitudes, velocities, body rates and added-mass velocities after the increments; arrays as in step_kernel.assemble."""
+    """Columns `new` of attitudes, velocities, body rates and added-mass velocities after the increments; see step_kernel.assemble."""
     _, quaternion, velocity, rate, flow, _ = old
     new_quaternion, new_velocity, new_rate, new_flow = new
     for first in range(0, line.mass.shape[0], WIDTH):

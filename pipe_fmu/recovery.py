@@ -14,7 +14,8 @@ from .assembly import expand
 from .columns import columns, fill_straight, line_columns, room
 from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, gradients
-from .lanes import WIDTH, grid, group, lane, row
+from .lane_arrays import grid, group, lane, row
+from .lanes import WIDTH
 from .line import Array
 from .loads import add_contact, add_drag
 from .parameters import PipeParameters

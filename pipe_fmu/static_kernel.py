@@ -6,7 +6,8 @@ from .assembly import add_matrix, add_vector, clear, expand, expand_matrix
 from .columns import columns, fill_straight, line_columns, room
 from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, strains
-from .lanes import WIDTH, grid, group, lane, row, total
+from .lane_arrays import grid, group, lane, row
+from .lanes import WIDTH, total
 from .loads import add_contact, add_drag
 
 

@@ -24,7 +24,8 @@ from .assembly import add_matrix, add_vector, clear, expand, expand_matrix
 from .columns import columns, fill, fill_straight, line_columns, room, take
 from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, resultant, strains
-from .lanes import WIDTH, above, below, grid, group, lane, largest, row, total
+from .lane_arrays import grid, group, lane, row
+from .lanes import WIDTH, above, below, largest, total
 from .loads import add_drag, add_mean_contact
 from .node_kernel import CONTACT, CURRENT, DRAG, INTERNAL, NUMERICAL, add_nodes, turn_columns
 from .so3 import add, dot, exp, left_jacobian, multiply, scale
