@@ -38,11 +38,11 @@ def add_matrix(diagonal, lower, upper, e, matrix):
 
 @inner
 def add_outer(matrix, factor, left, right):
-    """matrix += factor left right^T."""
-    for i in range(left.shape[0]):
+    """matrix += factor left right^T, of the twelve."""
+    for i in range(12):
         f = factor * left[i]
         if f != 0.0:
-            for j in range(right.shape[0]):
+            for j in range(12):
                 matrix[i, j] += f * right[j]
 
 

@@ -34,23 +34,30 @@ conjugate vectors N, c = N x u, M = A^-1 Q + b psi x c of (nu, beta, mu): its ro
 import math
 
 from .compiled import inner
+from .lanes import below, lane_by_lane
 from .so3 import add, apply, apply_transposed, conjugate, cross, dot, log, matrix, multiply, root, scale
 
 STRAINS = 6
 ROWS = 7
 _COIL = 1.0 / 24.0  # of the chord of a line bent and twisted at once
+_BENT, _TURNED = 0.36, 0.04  # bounds of |psi|^2 below which series are used
 
 
 @inner
-def _chi(z):
-    """chi = (rho - 1) / z and its first two derivatives, rho = a / sin a, z = |psi|^2 = 4 a^2."""
-    if z < 0.36:
-        c0, c1, c2, c3 = 1.0 / 24.0, 7.0 / 5760.0, 31.0 / 967680.0, 127.0 / 154828800.0
-        c4, c5, c6 = 73.0 / 3503554560.0, 5.281589e-10, 1.338096e-11
-        chi = c0 + z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * (c5 + z * c6)))))
-        d1 = c1 + z * (2.0 * c2 + z * (3.0 * c3 + z * (4.0 * c4 + z * (5.0 * c5 + z * 6.0 * c6))))
-        d2 = 2.0 * c2 + z * (6.0 * c3 + z * (12.0 * c4 + z * (20.0 * c5 + z * 30.0 * c6)))
-        return chi, d1, d2
+def _chi_series(z):
+    c0, c1, c2, c3 = 1.0 / 24.0, 7.0 / 5760.0, 31.0 / 967680.0, 127.0 / 154828800.0
+    c4, c5, c6 = 73.0 / 3503554560.0, 5.281589e-10, 1.338096e-11
+    chi = c0 + z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * (c5 + z * c6)))))
+    d1 = c1 + z * (2.0 * c2 + z * (3.0 * c3 + z * (4.0 * c4 + z * (5.0 * c5 + z * 6.0 * c6))))
+    d2 = 2.0 * c2 + z * (6.0 * c3 + z * (12.0 * c4 + z * (20.0 * c5 + z * 30.0 * c6)))
+    return chi, d1, d2
+
+
+@lane_by_lane
+@inner
+def _chi_closed(z):
+    if z < _BENT:
+        return _chi_series(z)
     a = 0.5 * math.sqrt(z)
     s, c = math.sin(a), math.cos(a)
     rho = a / s
@@ -63,14 +70,31 @@ def _chi(z):
 
 
 @inner
-def _half_spin(z):
-    """b = tan(a / 2) / (4 a) and its derivative with respect to z = 4 a^2."""
-    if z < 0.04:
-        b = 0.125 + z * (1.0 / 384.0 + z * (1.0 / 15360.0 + z * (17.0 / 10321920.0 + z * 31.0 / 743178240.0)))
-        return b, 1.0 / 384.0 + z * (2.0 / 15360.0 + z * (51.0 / 10321920.0 + z * 124.0 / 743178240.0))
+def _chi(z):
+    """chi = (rho - 1) / z and its first two derivatives, rho = a / sin a, z = |psi|^2 = 4 a^2."""
+    return _chi_series(z) if below(z, _BENT) else _chi_closed(z)
+
+
+@inner
+def _half_spin_series(z):
+    b = 0.125 + z * (1.0 / 384.0 + z * (1.0 / 15360.0 + z * (17.0 / 10321920.0 + z * 31.0 / 743178240.0)))
+    return b, 1.0 / 384.0 + z * (2.0 / 15360.0 + z * (51.0 / 10321920.0 + z * 124.0 / 743178240.0))
+
+
+@lane_by_lane
+@inner
+def _half_spin_closed(z):
+    if z < _TURNED:
+        return _half_spin_series(z)
     a = 0.5 * math.sqrt(z)
     t = math.tan(0.5 * a)
     return t / (4.0 * a), (0.5 * (1.0 + t * t) / (4.0 * a) - t / (4.0 * a * a)) / (8.0 * a)
+
+
+@inner
+def _half_spin(z):
+    """b = tan(a / 2) / (4 a) and its derivative with respect to z = 4 a^2."""
+    return _half_spin_series(z) if below(z, _TURNED) else _half_spin_closed(z)
 
 
 @inner

@@ -5,6 +5,8 @@ import math
 from .compiled import inner
 from .so3 import add, dot, scale
 
+_STILL = 1e-300  # of a square of a speed
+
 
 @inner
 def drag(v_r, tangent, tangential, normal):
@@ -18,26 +20,20 @@ def drag(v_r, tangent, tangential, normal):
     speed = math.sqrt(dot(v_n, v_n))
     force = add(scale(normal * speed, v_n), scale(tangential * math.fabs(v_t) * v_t, tangent))
     a = normal * speed
-    return force, a, 2.0 * tangential * math.fabs(v_t) - a, (normal / speed if speed > 0.0 else 0.0), v_n
+    c = a / max(dot(v_n, v_n), _STILL)
+    return force, a, 2.0 * tangential * math.fabs(v_t) - a, c, v_n
 
 
 @inner
 def current_at(z, levels, velocities):
     """Current (3,) at depth coordinate z: linear between `levels` (n,), ascending, constant beyond; `velocities` (n, 3) [m/s]."""
-    n = levels.shape[0]
-    if z <= levels[0]:
-        return (velocities[0, 0], velocities[0, 1], velocities[0, 2])
-    if z >= levels[n - 1]:
-        return (velocities[n - 1, 0], velocities[n - 1, 1], velocities[n - 1, 2])
-    k = 1
-    while levels[k] < z:
-        k += 1
-    f = (z - levels[k - 1]) / (levels[k] - levels[k - 1])
-    return (
-        velocities[k - 1, 0] + f * (velocities[k, 0] - velocities[k - 1, 0]),
-        velocities[k - 1, 1] + f * (velocities[k, 1] - velocities[k - 1, 1]),
-        velocities[k - 1, 2] + f * (velocities[k, 2] - velocities[k - 1, 2]),
-    )
+    x, y, w = velocities[0, 0] + 0.0 * z, velocities[0, 1] + 0.0 * z, velocities[0, 2] + 0.0 * z
+    for k in range(1, levels.shape[0]):
+        f = min(max((z - levels[k - 1]) / (levels[k] - levels[k - 1]), 0.0), 1.0)
+        x = x + f * (velocities[k, 0] - velocities[k - 1, 0])
+        y = y + f * (velocities[k, 1] - velocities[k - 1, 1])
+        w = w + f * (velocities[k, 2] - velocities[k - 1, 2])
+    return (x, y, w)
 
 
 @inner

@@ -1,4 +1,4 @@
-"""State of the pipe and the step from one to the next: (line, water, state, mean top velocity, h) -> (state, outputs)."""
+"""State of rest, and the step from one state to the next: (line, water, state, mean top velocity, h) -> (state, outputs)."""
 
 from typing import NamedTuple
 
@@ -7,29 +7,12 @@ import numpy as np
 from .energy import energies
 from .line import Array, Line, Water
 from .newton import solve_step
-from .node_kernel import advance
+from .state import WORKS, PipeState
 from .step_kernel import element_strains, folded
 
-MAX_CORRECTIONS = 25
-CAREFUL_CORRECTIONS = 100
 STIFF = np.zeros((6, 6))  # mobility of a top that moves as it is told
-WORKS = ("drag", "current", "rotational", "internal", "contact", "numerical")
-
-
-class PipeState(NamedTuple):
-    """Everything that decides the next step; never changed once made."""
-
-    time: float  # s
-    position: Array  # (n, 3) phi [m], e
-    quaternion: Array  # (n, 4) attitude of the sections
-    velocity: Array  # (n, 3) of the centres of the nodes' masses [m/s], e
-    rate: Array  # (n, 3) angular velocity [rad/s], material
-    flow: Array  # (n, 3) velocity of the added mass [m/s], material; (0, 3) when absent
-    strain: Array  # (n - 1, 7) strains and sags
-    last: Array  # (n, 6) mean velocities of the last step, for the extrapolation
-    before: Array  # (n, 6) those of the step before
-    top_work: float  # work done on the pipe at its top since the start [J]
-    works: Array  # (6,) work or dissipation since the start [J], in the order of WORKS
+# Searches for a step's solution: the guess of the mean velocities, from those of the last three steps, and whether to go carefully
+_SEARCHES = (((3.0, -3.0, 1.0), False), ((1.0, 0.0, 0.0), True), ((0.0, 0.0, 0.0), True))
 
 
 class StepResult(NamedTuple):
@@ -49,9 +32,9 @@ def rest(line: Line, position: Array, quaternion: Array, time: float) -> PipeSta
     n = len(position)
     strain = np.empty((n - 1, 7))
     element_strains(line, position, quaternion, strain)
-    zero = np.zeros((n, 3))
+    zero, still = np.zeros((n, 3)), np.zeros((n, 6))
     flow = np.zeros((len(line.added_mass), 3))
-    return PipeState(time, position, quaternion, zero, zero, flow, strain, np.zeros((n, 6)), np.zeros((n, 6)), 0.0, np.zeros(len(WORKS)))
+    return PipeState(time, position, quaternion, zero, zero, flow, strain, still, still, still, 0.0, np.zeros(len(WORKS)))
 
 
 def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Array, h: float, mobility: Array = STIFF) -> StepResult:
@@ -60,39 +43,17 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     water: at the middle of the step; velocity, spin (3,): mean velocity and angular velocity of the top, in e; or those that it
     would have without the pipe, where it yields to the pipe's pull with `mobility` (6, 6), the derivative of the one by the other.
     """
-    top = h * np.concatenate([velocity, spin])
-    old = state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain
     spent, fold = 0, False
-    for guess, careful in ((2.0 * state.last - state.before, False), (state.last, True), (np.zeros_like(state.last), True)):
-        limit = CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
-        converged, x, strain, force, tangent, works, iterations, residual = solve_step(
-            line, water, h, *old, h * guess, top, h * mobility, careful, limit
+    for weights, careful in _SEARCHES:
+        converged, new, force, impedance, iterations, residual = solve_step(
+            line, water, state, velocity, spin, h, mobility, weights, careful
         )
         spent += iterations
-        fold = converged and folded(line.length, state.strain, strain)
+        fold = converged and folded(line.length, state.strain, new.strain)
         if converged and not fold:
             break
-    if not line.top_clamped:
-        force[3:] = 0.0
-    if fold or not converged:
-        return StepResult(False, state, force, h * tangent, spent, residual, fold)
-    quaternion, rate, flow = np.empty_like(state.quaternion), np.empty_like(state.rate), np.empty_like(state.flow)
-    speed = np.empty_like(state.velocity)
-    advance(line, h, state.quaternion, state.velocity, state.rate, state.flow, x, quaternion, speed, rate, flow)
-    new = PipeState(
-        time=state.time + h,
-        position=state.position + x[:, :3],
-        quaternion=quaternion,
-        velocity=speed,
-        rate=rate,
-        flow=flow,
-        strain=strain,
-        last=x / h,
-        before=state.last,
-        top_work=state.top_work + float(force @ x[-1]),
-        works=state.works + works,
-    )
-    return StepResult(True, new, force, h * tangent, spent, residual)
+    done = converged and not fold
+    return StepResult(done, new if done else state, force, impedance, spent, residual, fold)
 
 
 def energy_of(line: Line, state: PipeState) -> tuple[float, float, float, float]:

@@ -12,7 +12,7 @@ from .assembly import add_outer, expand
 from .compiled import inner
 from .hydrodynamics import current_at, drag
 from .seabed import contact, mean_contact
-from .so3 import add, apply, cross, dot, scale
+from .so3 import add, apply, cross, dot, scale, subtract
 
 DRAG_POINTS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 BED_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
@@ -62,7 +62,7 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
     """Drag on one element into `vector` (12,) (minus the force on the pipe) and, if `fresh`, its tangent into `matrix` (12, 12).
 
     rm, u, psi: frame, chord in it and relative rotation; `ends` (2, 6) velocities (v, w) of the nodes; `depths` (2,) their z;
-    `rate` = d velocity / d unknown [1/s]; `scratch` (2, 3, 12).
+    `rate` = d velocity / d unknown [1/s]; scratch: two (3, 12).
     Returns (power dissipated >= 0, power supplied by the current) [W].
     """
     d = apply(rm, u)
@@ -71,7 +71,7 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
     bow = apply(rm, psi)
     swing = _sag_rate(d, bow, v1, v2, (ends[0, 3], ends[0, 4], ends[0, 5]), (ends[1, 3], ends[1, 4], ends[1, 5]))
     sag = 0.5 * (d[0] * bow[1] - d[1] * bow[0])
-    dissipated, supplied = 0.0, 0.0
+    dissipated, supplied = 0.0 * h, 0.0 * h
     moves, slopes = scratch[0], scratch[1]
     for x in DRAG_POINTS:
         y = 1.0 - x
@@ -80,11 +80,10 @@ def add_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate
         local = (1.0, bend[1], bend[2])
         tangent = apply(rm, scale(1.0 / math.sqrt(dot(local, local)), local))
         v = add(add(scale(y, v1), scale(x, v2)), scale(linked, swing))
-        v_r = v
-        v_c = (0.0, 0.0, 0.0)
+        v_c = (0.0 * h, 0.0 * h, 0.0 * h)
         if levels.shape[0] > 0:
             v_c = current_at(y * depths[0] + x * depths[1] + linked * sag, levels, velocities)
-            v_r = add(v, scale(-1.0, v_c))
+        v_r = subtract(v, v_c)
         force, a, b, c, v_n = drag(v_r, tangent, coefficients[0], coefficients[1])
         force = scale(0.5 * h, force)
         dissipated += dot(force, v_r)
@@ -186,10 +185,10 @@ def add_mean_contact(h, dt, diameter, weight, bed, old, new, ends, mean_row, new
     of the sag, averaged over the step and at its end; `bed` = (damping [s/m], friction, friction speed [m/s]). The dashpot's force is
     damping * z' times the elastic force: it acts in contact only, and at most takes that force away. Friction is Coulomb's, regularised.
     Tangent if `fresh`; that of friction is Newton's if `sharp`, else one that never underrates it, with which no correction overshoots.
-    `scratch` (2, 3, 12). Returns the work dissipated [J].
+    `scratch`: one of (3, 12). Returns the work dissipated [J].
     """
     dissipated = 0.0
-    row, row_new = scratch[0, 0], scratch[0, 1]
+    row, row_new = scratch[0][0], scratch[0][1]
     for k in range(4):
         x = BED_POINTS[k]
         y = 1.0 - x

@@ -5,27 +5,32 @@ import math
 import numpy as np
 
 from .block_tridiagonal import SIZE, condense, factorize, lu, lu_solve, lu_solve_vector, substitute
-from .compiled import kernel
+from .columns import line_columns, take
+from .compiled import inner, kernel
+from .node_kernel import advance
 from .so3 import dot, matrix
-from .step_kernel import step_system
+from .state import PipeState
+from .step_kernel import assemble, old_columns
 
 TOLERANCE = 1e-11  # of the largest element force (moment): well below any coupling tolerance
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
 NEAR = 1e-5  # residual from which on a tangent is kept
+MAX_CORRECTIONS = 25
+CAREFUL_CORRECTIONS = 100
 SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
 SHARP = 1e-3  # residual below which a careful search takes Newton's tangent of friction
 LEAST_SHARE = 0.02  # of a correction: a careful search halves no further
 LOST = 1e12  # residual, and element force over the axial stiffness, from which there is no way back
 
 
-@kernel
+@inner
 def _axis(quaternion):
     """Direction t1 of the foot."""
     rm = matrix((quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3]))
     return (rm[0][0], rm[1][0], rm[2][0])
 
 
-@kernel
+@inner
 def hold_foot(line, quaternion, diagonal, upper):
     """Impose the foot on the tangent: clamped, or pinned (position held, no spin about t1, so that the line's twist is determined)."""
     block, coupling = diagonal[0], upper[0]
@@ -47,7 +52,7 @@ def hold_foot(line, quaternion, diagonal, upper):
                 block[3 + i, j] += stiffness * axis[i] * axis[j - 3]
 
 
-@kernel
+@inner
 def hold_foot_residual(line, quaternion, theta, residual):
     """Impose the foot on the residual; `theta` its trial rotation."""
     for i in range(SIZE if line.foot_clamped else 3):
@@ -145,44 +150,94 @@ def condense_top(line, block, out):
                     out[i, j] -= block[i, 3 + k] * sides[k, j]
 
 
-@kernel
+@inner
 def _size(residual, force_scale, moment_scale, top_clamped):
     """Largest free residual over its scale."""
     worst = 0.0
     n = residual.shape[0]
-    for i in range(n):
-        for j in range(SIZE):
-            if i == n - 1 and (top_clamped or j < 3):
-                continue
-            ratio = math.fabs(residual[i, j]) / (force_scale if j < 3 else moment_scale)
+    for i in range(n if not top_clamped else n - 1):
+        held = i == n - 1
+        for j in range(3):
+            force = 0.0 if held else math.fabs(residual[i, j]) / force_scale
+            ratio = max(force, math.fabs(residual[i, 3 + j]) / moment_scale)
             if not ratio <= worst:
                 worst = ratio
     return worst
 
 
 @kernel
-def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strain, guess, top, mobility, careful, limit):
-    """Increments (n, 6) of one step, from `guess` (n, 6), in at most `limit` corrections.
+def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful):
+    """One step from a guess of its mean velocities: the sum of those of the last three steps times `weights`.
+
+    velocity, spin (3,), mobility (6, 6): see integrator.step; careful: see `_search`. Returns (converged, new state, force on the pipe's
+    top (6,), its derivative by the mean velocity (6, 6), corrections, residual); when not converged the state is the old one.
+    """
+    n = state.position.shape[0]
+    ours = line_columns(line)
+    old, new = old_columns(state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain)
+    x, top, works = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
+    for k in range(3):
+        top[k], top[3 + k] = h * velocity[k], h * spin[k]
+    for i in range(n):
+        for k in range(SIZE):
+            guess = weights[0] * state.last[i, k] + weights[1] * state.before[i, k] + weights[2] * state.earlier[i, k]
+            x[i, k] = h * guess
+    for k in range(SIZE if line.foot_clamped else 3):
+        x[0, k] = 0.0  # exactly: no correction moves what is held
+    force, tangent = np.empty(SIZE), np.zeros((SIZE, SIZE))
+    system = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n, SIZE))
+    scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
+    ends = state.quaternion, h * mobility, top, force, tangent
+    converged, iterations, size = _search(line, ours, water, h, old, new, x, careful, works, ends, system, scratch)
+    for i in range(3 if not line.top_clamped else 0):
+        force[3 + i] = 0.0
+    found = _advanced(ours, h, state, old, new, x, force, works) if converged else state
+    return converged, found, force, h * tangent, iterations, size
+
+
+@kernel
+def _advanced(line, h, state, old, new, x, force, works):
+    """State after the increments x (n, 6); line and old state, and attitudes and strains on the way, in columns."""
+    fields = np.empty_like(old[1]), np.empty_like(old[2]), np.empty_like(old[3]), np.empty_like(old[4])
+    advance(line, h, old, new[0], new[1], fields)
+    position, last = np.empty_like(state.position), np.empty_like(x)
+    quaternion, velocity, rate = np.empty_like(state.quaternion), np.empty_like(state.velocity), np.empty_like(state.rate)
+    flow, strain = np.empty_like(state.flow), np.empty_like(state.strain)
+    for i in range(x.shape[0]):
+        for k in range(3):
+            position[i, k] = state.position[i, k] + x[i, k]
+        for k in range(SIZE):
+            last[i, k] = x[i, k] / h
+    take(fields[0], quaternion)
+    take(fields[1], velocity)
+    take(fields[2], rate)
+    take(fields[3], flow)
+    take(new[2], strain)
+    top_work = state.top_work
+    for k in range(SIZE):
+        top_work += force[k] * x[-1, k]
+        works[k] += state.works[k]
+    return PipeState(state.time + h, position, quaternion, velocity, rate, flow, strain, last, state.last, state.before, top_work, works)
+
+
+@kernel
+def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scratch):
+    """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (columns.py).
 
     The top's increment is `top` (6,) less mobility (6, 6) x the force on it; without a mobility it is prescribed, and met exactly; with
     one the force is still exactly that of the increment found, but the relation between the two is met to the last correction only.
 
     The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
     is made anew for every further one. A `careful` search makes it anew always, starts with a tangent of friction with which nothing
-    overshoots, and halves a correction that does not lower the residual. Returns (converged, x, new_strain, top force (6,) on the pipe,
-    condensed tangent (6, 6), works (6,), corrections, residual).
+    overshoots, and halves a correction that does not lower the residual. Fills the force on the pipe's top (6,), the tangent (6, 6) as the
+    top feels it and the works (6,). Returns (converged, corrections, residual).
+
+    ends: quaternions (n, 4), mobility, top, force, tangent; system: as in step_kernel.assemble; scratch: (n, 6), (6,), (6,).
     """
-    n = guess.shape[0]
-    system = (np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6)))
+    quaternion, mobility, top, force, tangent = ends
+    correction, wanted, move = scratch
+    n, limit = x.shape[0], CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
     diagonal, lower, upper, residual = system
-    old = (position, quaternion, velocity, rate, flow, strain)
-    pivots = np.empty((n - 1, SIZE), np.int64)
-    x = guess.copy()
-    correction = np.empty((n, SIZE))
-    new_strain = np.empty(strain.shape)
-    works = np.empty(6)
-    tangent = np.zeros((6, 6))
-    force, wanted, move = np.empty(6), np.empty(6), np.empty(6)
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
     fresh, keep = True, True
@@ -192,7 +247,7 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             prescribed = prescribed and mobility[i, j] == 0.0
     for iteration in range(limit + 1):
         sharp = not careful or size < SHARP
-        force_scale, moment_scale = step_system(line, water, h, *old, x, new_strain, fresh, sharp, system, works)
+        force_scale, moment_scale = assemble(ours, water, h, old, new, x, fresh, sharp, system, works)
         gap = 0.0
         for i in range(SIZE):
             force[i] = residual[n - 1, i]
@@ -202,9 +257,10 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
         hold_foot_residual(line, quaternion, (x[0, 3], x[0, 4], x[0, 5]), residual)
         size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
         lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
-        done = not lost and gap == 0.0 and (size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous and share == 1.0))
+        stalled = max(size, previous) <= ROUND_OFF and size > 0.3 * previous and share == 1.0
+        done = not lost and gap == 0.0 and (size <= TOLERANCE or stalled)
         if done and iteration > 0:
-            return True, x, new_strain, force, tangent, works, iteration, size
+            return True, iteration, size
         if careful and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
             share *= 0.5
             _move(x, -share, correction)
@@ -214,32 +270,32 @@ def solve_step(line, water, h, position, quaternion, velocity, rate, flow, strai
             break
         if fresh:
             hold_foot(line, quaternion, diagonal, upper)
-            if not factorize(diagonal, lower, upper, pivots):
+            if not factorize(diagonal, lower, upper):
                 break
             condense_top(line, diagonal[n - 1], tangent)
         elif size > SLOW * previous or size > NEAR:
             fresh, keep = True, size <= SLOW * previous
             continue
         if done:
-            return True, x, new_strain, force, tangent, works, iteration, size
+            return True, iteration, size
         fresh = careful or not keep
-        condense(diagonal, lower, pivots, residual)
+        condense(lower, residual)
         if prescribed:
             fine = top_correction(line, diagonal[n - 1], residual[n - 1], wanted, move)
         else:
             fine = yielding(line, diagonal[n - 1], residual[n - 1], tangent, wanted, mobility, move)
         if not fine:
             break
-        substitute(upper, residual, move, correction)
+        substitute(diagonal, upper, residual, move, correction)
         _move(x, 1.0, correction)
         for i in range(SIZE):
             if prescribed and (line.top_clamped or i < 3):
                 x[n - 1, i] = top[i]
         previous = size
-    return False, x, new_strain, force, tangent, works, limit, size
+    return False, limit, size
 
 
-@kernel
+@inner
 def _move(x, share, correction):
     """x += share * correction."""
     for k in range(x.shape[0]):

@@ -1,23 +1,32 @@
 """What a step does at the nodes: inertia of lumped mass and section, rotational damping, added mass; and the state after it."""
 
 from .compiled import inner
-from .so3 import add, apply, apply_transposed, cross, dot, exp, left_jacobian_transposed, matrix, multiply, normalize, scale
-from .static_kernel import spin
+from .lane_arrays import grid, group, lane, row
+from .lanes import WIDTH
+from .so3 import (
+    add,
+    apply,
+    apply_transposed,
+    cross,
+    dot,
+    left_jacobian,
+    left_jacobian_transposed,
+    matrix,
+    normalize,
+    scale,
+)
+from .static_kernel import attitude, vector_of
 
 DRAG, CURRENT, SPIN, INTERNAL, CONTACT, NUMERICAL = range(6)  # works over the step, in this order
+_MIDDLE, _END = 1, 3  # of the path of a step
 
 
 @inner
-def vector_of(x, i, j):
-    return (x[i, j], x[i, j + 1], x[i, j + 2])
-
-
-@inner
-def turn_columns(theta, block):
-    """block[:, 3:] <- block[:, 3:] J_l(theta): from spins at the end of the step to the rotation vector."""
-    for i in range(6):
-        turned = left_jacobian_transposed(theta, (block[i, 3], block[i, 4], block[i, 5]))
-        block[i, 3], block[i, 4], block[i, 5] = turned
+def turn_columns(jacobian, block, height, first):
+    """block[:, first:first + 3] <- block[:, first:first + 3] J_l: from spins at the end of the step to the rotation vector."""
+    for i in range(height):
+        turned = apply_transposed(jacobian, (block[i, first], block[i, first + 1], block[i, first + 2]))
+        block[i, first], block[i, first + 1], block[i, first + 2] = turned
 
 
 @inner
@@ -52,39 +61,58 @@ def _add_lever(arm, arm_new, tensor, gain, fresh, block, residual):
 
 
 @inner
-def add_node(line, i, h, quaternion, velocity, rate, flow, x, fresh, block, residual, works, tensor):
-    """Inertia, rotational damping (material frame) and added mass of one node; `tensor` (3, 3) is scratch."""
-    q = spin(quaternion, i)
-    theta = vector_of(x, i, 3)
-    r_old = matrix(q)
-    r_mid = matrix(multiply(exp(scale(0.5, theta)), q))
-    r_new = matrix(multiply(exp(theta), q))
+def add_nodes(line, first, count, h, old, moves, turned, fresh, diagonal, residual, sums):
+    """Add the inertia, damping and added mass of the `count` nodes from `first` on; arrays as in step_kernel.assemble."""
+    at = group(first)
+    block, force = grid(6, 6), row(6)
+    for i in range(6):
+        force[i] = 0.0
+        for j in range(6):
+            block[i, j] = 0.0
+    _add_node(line, at, h, old, moves, turned, fresh, block, force, sums)
+    if fresh:
+        turn_columns(left_jacobian(vector_of(moves, 3, at)), block, 6, 3)
+    for m in range(count):
+        ours, our_force = lane(block, m), lane(force, m)
+        for i in range(6):
+            residual[first + m, i] += our_force[i]
+            for j in range(6 if fresh else 0):
+                diagonal[first + m, i, j] += ours[i, j]
+
+
+@inner
+def _add_node(line, i, h, old, moves, turned, fresh, block, residual, works):
+    """Inertia, rotational damping (material frame) and added mass of one node, or of a group."""
+    _, quaternion, velocity, rate, flow, _ = old
+    tensor = grid(3, 3)
+    theta = vector_of(moves, 3, i)
+    r_old = matrix(attitude(quaternion, i))
+    r_mid = matrix(attitude(turned[_MIDDLE], i))
+    r_new = matrix(attitude(turned[_END], i))
     turn = apply_transposed(r_old, theta)
-    arm, move = _mass_motion(line.offset[i], theta, r_old, vector_of(x, i, 0))
+    arm, move = _mass_motion(line.offset[i], theta, r_old, vector_of(moves, 0, i))
     arm_new = scale(line.offset[i], (r_new[0][0], r_new[1][0], r_new[2][0]))
     pace = 2.0 * line.mass[i] / (h * h)
     for a in range(3):
         for b in range(3):
-            tensor[a, b] = pace if a == b else 0.0
-    gain = (
-        pace * (move[0] - h * velocity[i, 0]),
-        pace * (move[1] - h * velocity[i, 1]),
-        pace * (move[2] - h * velocity[i, 2]),
-    )
+            tensor[a, b] = pace if a == b else 0.0 * pace
+    gain = scale(pace, add(move, scale(-h, vector_of(velocity, 0, i))))
     _add_lever(arm, arm_new, tensor, gain, fresh, block, residual)
-    j, c = line.inertia[i], line.spin_damping[i]
-    w_new = (2.0 * turn[0] / h - rate[i, 0], 2.0 * turn[1] / h - rate[i, 1], 2.0 * turn[2] / h - rate[i, 2])
+    j, c = vector_of(line.inertia, 0, i), vector_of(line.spin_damping, 0, i)
+    w_old = vector_of(rate, 0, i)
+    w_new = add(scale(2.0 / h, turn), scale(-1.0, w_old))
     momentum = apply(r_new, (j[0] * w_new[0], j[1] * w_new[1], j[2] * w_new[2]))
-    before = apply(r_old, (j[0] * rate[i, 0], j[1] * rate[i, 1], j[2] * rate[i, 2]))
+    before = apply(r_old, (j[0] * w_old[0], j[1] * w_old[1], j[2] * w_old[2]))
     brake = apply(r_mid, (c[0] * turn[0] / h, c[1] * turn[1] / h, c[2] * turn[2] / h))
-    works[SPIN] += (c[0] * turn[0] ** 2 + c[1] * turn[1] ** 2 + c[2] * turn[2] ** 2) / h
+    works[SPIN] += (c[0] * turn[0] * turn[0] + c[1] * turn[1] * turn[1] + c[2] * turn[2] * turn[2]) / h
     for a in range(3):
         residual[3 + a] += (momentum[a] - before[a]) / h + brake[a]
         for b in range(3 if fresh else 0):
             for k in range(3):
                 block[3 + a, 3 + b] += (2.0 * j[k] / (h * h) + c[k] / h) * r_mid[a][k] * r_mid[b][k]
-    if line.added_mass.shape[0] > 0:
-        _add_added_mass(line.added_mass[i], h, flow[i], r_mid, scale(1.0 / h, turn), arm, arm_new, move, fresh, block, residual, tensor)
+    if line.added_mass.shape[1] > 0:
+        m, v_flow = vector_of(line.added_mass, 0, i), vector_of(flow, 0, i)
+        _add_added_mass(m, h, v_flow, r_mid, scale(1.0 / h, turn), arm, arm_new, move, fresh, block, residual, tensor)
 
 
 @inner
@@ -114,21 +142,24 @@ def _add_added_mass(m, h, flow, r_mid, spin_t, arm, arm_new, move, fresh, block,
 
 
 @inner
-def advance(line, h, quaternion, velocity, rate, flow, x, new_quaternion, new_velocity, new_rate, new_flow):
-    """Attitudes, velocities, body rates and added-mass velocities after the increments x (n, 6)."""
-    for i in range(x.shape[0]):
-        theta, q = vector_of(x, i, 3), spin(quaternion, i)
-        r_old = matrix(q)
+def advance(line, h, old, moves, turned, new):
+    """Columns `new` of attitudes, velocities, body rates and added-mass velocities after the increments; see step_kernel.assemble."""
+    _, quaternion, velocity, rate, flow, _ = old
+    new_quaternion, new_velocity, new_rate, new_flow = new
+    for first in range(0, line.mass.shape[0], WIDTH):
+        i = group(first)
+        theta = vector_of(moves, 3, i)
+        r_old = matrix(attitude(quaternion, i))
         turn = apply_transposed(r_old, theta)
-        turned = normalize(multiply(exp(theta), q))
-        _, move = _mass_motion(line.offset[i], theta, r_old, vector_of(x, i, 0))
+        now = normalize(attitude(turned[_END], i))
+        _, move = _mass_motion(line.offset[i], theta, r_old, vector_of(moves, 0, i))
         for a in range(3):
-            new_velocity[i, a] = 2.0 * move[a] / h - velocity[i, a]
-            new_rate[i, a] = 2.0 * turn[a] / h - rate[i, a]
+            new_velocity[a, i] = 2.0 * move[a] / h - velocity[a, i]
+            new_rate[a, i] = 2.0 * turn[a] / h - rate[a, i]
         for a in range(4):
-            new_quaternion[i, a] = turned[a]
-        if flow.shape[0] > 0:
-            r_mid = matrix(multiply(exp(scale(0.5, theta)), q))
+            new_quaternion[a, i] = now[a]
+        if flow.shape[1] > 0:
+            r_mid = matrix(attitude(turned[_MIDDLE], i))
             v = apply_transposed(r_mid, scale(1.0 / h, move))
             for a in range(3):
-                new_flow[i, a] = 2.0 * v[a] - flow[i, a]
+                new_flow[a, i] = 2.0 * v[a] - flow[a, i]

@@ -11,13 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from .assembly import expand
-from .compiled import inner
+from .columns import columns, fill_straight, line_columns, room
+from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, gradients
-from .line import Array, Line, Water
+from .lane_arrays import grid, group, lane, row
+from .lanes import WIDTH
+from .line import Array
 from .loads import add_drag, add_press, press
 from .parameters import PipeParameters
 from .so3 import apply_transposed, matrix
-from .static_kernel import chord, spin
+from .static_kernel import attitude, chord
 
 _SAMPLES = 16  # parts of an element
 
@@ -58,51 +61,66 @@ def _largest_square(s, moment, shear):
     return largest
 
 
-def nodal_wrenches(line: Line, water: Water, position: Array, quaternion: Array, velocity: Array, strain: Array) -> Array:
+@kernel
+def nodal_wrenches(line, water, position, quaternion, velocity, strain):
     """Section force and moment (n, 6) at the nodes, material components."""
-    out = np.zeros((len(position), 6))
-    elemental = np.empty((ROWS, 9)), np.empty((12, 12)), np.empty((2, 3, 12)), np.zeros((2, 6)), np.empty((3, 12)), np.zeros((4, 2))
-    _nodal_wrenches(line, water, position, quaternion, velocity, strain, out, elemental)
-    return out
-
-
-@inner
-def _nodal_wrenches(line, water, position, quaternion, velocity, strain, out, elemental):
-    rows, unused, scratch, ends, vectors, points = elemental
-    nine, vector, depths = vectors[0, :9], vectors[1], vectors[2]
     n = position.shape[0]
-    for e in range(n - 1):
-        h = line.length[e]
-        rm, u, psi = frame(spin(quaternion, e), spin(quaternion, e + 1), chord(position, e))
-        gradients(rm, u, psi, h, line.share[e], rows)
-        weight = h * line.weight[e]
-        depths[0], depths[1] = position[e, 2], position[e + 1, 2]
-        on_sag = -weight / 6.0
-        if line.bed.shape[0] > 0:
-            on_sag += press(h, line.diameter[e], line.weight[e], depths[0], depths[1], strain[e, STRAINS], points)[1]
-        nine[:] = 0.0
-        for k in range(ROWS):
-            stress = h * line.stiffness[e, k] * strain[e, k] if k < STRAINS else on_sag
-            for i in range(9):
-                nine[i] += stress * rows[k, i]
-        expand(nine, vector)
-        vector[2] -= 0.5 * weight
-        vector[8] -= 0.5 * weight
-        add_press(points, vector)
-        if water.drag:
-            for i in range(3):
-                ends[0, i], ends[1, i] = velocity[e, i], velocity[e + 1, i]
-            add_drag(rm, u, psi, h, line.drag[e], ends, depths, water.levels, water.velocities, 0.0, False, vector, unused, scratch)
-        for i in range(6):
-            out[e, i] -= vector[i] * (1.0 if e == 0 else 0.5)
-            out[e + 1, i] += vector[6 + i] * (1.0 if e == n - 2 else 0.5)
+    out, positions = np.zeros((n, 6)), np.empty((3, room(n)))
+    fill_straight(position, positions)
+    state = positions, columns(quaternion, n, 1.0), columns(velocity, n, 1.0), columns(strain, n, 1.0)
+    _add_end_forces(line_columns(line), water, *state, out)
     for k in range(n):
-        r = matrix(spin(quaternion, k))
+        r = matrix((quaternion[k, 0], quaternion[k, 1], quaternion[k, 2], quaternion[k, 3]))
         force = apply_transposed(r, (out[k, 0], out[k, 1], out[k, 2]))
         moment = apply_transposed(r, (out[k, 3], out[k, 4], out[k, 5]))
         for i in range(3):
             out[k, i] = force[i]
             out[k, 3 + i] = moment[i]
+    return out
+
+
+@inner
+def _add_end_forces(line, water, position, quaternion, velocity, strain, out):
+    """Add what the elements hand to their nodes, less their own loads, to `out` (n, 6), the mean of left and right; columns elsewhere."""
+    n = out.shape[0]
+    for first in range(0, n - 1, WIDTH):
+        a, b, count = group(first), group(first + 1), min(WIDTH, n - 1 - first)
+        stress, nine, vector = row(7), row(9), row(12)
+        rows, unused, ends, drags = grid(7, 9), grid(12, 12), grid(2, 6), (grid(3, 12), grid(3, 12))
+        points, by_sag = grid(4, 2), row(12)
+        h = line.length[a]
+        rm, u, psi = frame(attitude(quaternion, a), attitude(quaternion, b), chord(position, a, b))
+        gradients(rm, u, psi, h, (line.share[0, a], line.share[1, a]), rows)
+        weight = h * line.weight[a]
+        for k in range(STRAINS):
+            stress[k] = h * line.stiffness[k, a] * strain[k, a]
+        stress[STRAINS] = -weight / 6.0
+        for i in range(9):
+            nine[i] = 0.0
+            for k in range(ROWS):
+                nine[i] += stress[k] * rows[k, i]
+        expand(nine, vector)
+        vector[2] -= 0.5 * weight
+        vector[8] -= 0.5 * weight
+        if water.drag:
+            for i in range(3):
+                ends[0, i], ends[1, i] = velocity[i, a], velocity[i, b]
+                ends[0, 3 + i], ends[1, 3 + i] = 0.0, 0.0
+            depths, coefficients = (position[2, a], position[2, b]), (line.drag[0, a], line.drag[1, a])
+            stream = water.levels, water.velocities
+            add_drag(rm, u, psi, h, coefficients, ends, depths, *stream, 0.0, False, vector, unused, drags)
+        for m in range(count):
+            e, ours = first + m, lane(vector, m)
+            if line.bed.shape[0] > 0:
+                lies = line.length[e], line.diameter[e], line.weight[e], position[2, e], position[2, e + 1], strain[STRAINS, e]
+                _, on_sag = press(*lies, lane(points, m))
+                add_press(lane(points, m), ours)
+                expand(lane(rows, m)[STRAINS], lane(by_sag, m))
+                for i in range(12):
+                    ours[i] += on_sag * lane(by_sag, m)[i]
+            for i in range(6):
+                out[e, i] -= ours[i] * (1.0 if e == 0 else 0.5)
+                out[e + 1, i] += ours[6 + i] * (1.0 if e == n - 2 else 0.5)
 
 
 def centreline_length(line_length: Array, strain: Array) -> float:

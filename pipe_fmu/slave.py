@@ -27,8 +27,12 @@ class PipeUnit:
     INPUTS: ClassVar[dict[str, Port]] = {
         "velocity": (3, "m/s", f"velocity {_MOTION}"),
         "angular_velocity": (3, "rad/s", f"angular velocity {_MOTION}"),
-        "mobility": (36, "", "zero, or what the hang-off point yields to the pull: d(velocities) / d(force, moment), row by row, SI; "
-                     "the velocities are then those without a pull"),
+        "mobility": (
+            36,
+            "",
+            "zero, or what the hang-off point yields to the pull: d(velocities) / d(force, moment), row by row, SI; "
+            "the velocities are then those without a pull",
+        ),
     }
 
     def __init__(self, parameters: PipeParameters) -> None:

@@ -1,13 +1,20 @@
 """Rotations as unit quaternions (scalar first) and vectors as tuples of three floats.
 
-All functions are compiled, take and return tuples, and allocate nothing. `exp` and `log` are the exponential map of
-SO(3) and its inverse (rotation vectors); `left_jacobian` is the matrix J_l of `exp(J_l(theta) d) exp(theta) =
+All functions are compiled, take and return tuples, and allocate nothing; their numbers may be Lanes (lanes.py). `exp` and `log` are the
+exponential map of SO(3) and its inverse (rotation vectors); `left_jacobian` is the matrix J_l of `exp(J_l(theta) d) exp(theta) =
 exp(theta + d)` to first order in d. Source: Crisfield and Jelenic (1999), section 2; Sola (2017), chapter 4.
+
+Functions of an angle are taken from its square z: by their power series up to a bound below which what is left out is round-off, else in
+closed form.
 """
 
 import math
 
 from .compiled import inner
+from .lanes import below, lane_by_lane
+
+_TURN = 0.25  # bound of z for sines
+_ARC = 0.023  # and for the tangent's inverse, of its square
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -17,6 +24,12 @@ Quaternion = tuple[float, float, float, float]
 def add(a, b):
     """Sum of two vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@inner
+def subtract(a, b):
+    """Difference of two vectors."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @inner
@@ -55,34 +68,71 @@ def conjugate(q):
 
 
 @inner
+def _cosine_series(z):
+    return 1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0 * (1.0 - z / 132.0 * (1.0 - z / 182.0))))))
+
+
+@inner
+def _sine_series(z):
+    return 1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0 * (1.0 - z / 156.0)))))
+
+
+@lane_by_lane
+@inner
+def _cosine(z):
+    """cos a, z = a^2."""
+    return _cosine_series(z) if z < _TURN else math.cos(math.sqrt(z))
+
+
+@lane_by_lane
+@inner
+def _sine(z):
+    """sin a / a, z = a^2."""
+    return _sine_series(z) if z < _TURN else math.sin(math.sqrt(z)) / math.sqrt(z)
+
+
+@inner
 def exp(theta):
     """Quaternion of a rotation vector [rad]."""
-    half = 0.5 * math.sqrt(dot(theta, theta))
-    if half < 1e-4:
-        k = 0.5 - half * half / 12.0
-        c = 1.0 - 0.5 * half * half
+    z = 0.25 * dot(theta, theta)
+    if below(z, _TURN):
+        c, k = _cosine_series(z), 0.5 * _sine_series(z)
     else:
-        k = 0.5 * math.sin(half) / half
-        c = math.cos(half)
+        c, k = _cosine(z), 0.5 * _sine(z)
     return (c, k * theta[0], k * theta[1], k * theta[2])
 
 
 @inner
+def _arc_series(z):
+    out = 1.0 / 19.0
+    for n in (17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0):
+        out = 1.0 / n - z * out
+    return out
+
+
+@lane_by_lane
+@inner
+def _arc(z):
+    """atan t / t, z = t^2."""
+    return _arc_series(z) if z < _ARC else math.atan(math.sqrt(z)) / math.sqrt(z)
+
+
+@inner
 def log(q):
-    """Rotation vector [rad], at most pi long, of a unit quaternion."""
-    sign = -1.0 if q[0] < 0.0 else 1.0
-    s = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    k = 2.0 * sign * (1.0 + s * s / 6.0) if s < 1e-5 else 2.0 * math.atan2(s, sign * q[0]) / s * sign
+    """Rotation vector [rad], at most pi long, of a unit quaternion; its length is 4 atan of the tangent of a quarter of the angle."""
+    k = 1.0 / (1.0 + math.fabs(q[0]))
+    z = k * k * (q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    k *= math.copysign(4.0, q[0]) * (_arc_series(z) if below(z, _ARC) else _arc(z))
     return (k * q[1], k * q[2], k * q[3])
 
 
 @inner
 def root(q):
     """Half of the rotation q: the quaternion of `log(q) / 2`."""
-    sign = -1.0 if q[0] < 0.0 else 1.0
-    w = 1.0 + sign * q[0]
+    w = 1.0 + math.fabs(q[0])
     n = 1.0 / math.sqrt(w * w + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    return (w * n, sign * q[1] * n, sign * q[2] * n, sign * q[3] * n)
+    k = math.copysign(n, q[0])
+    return (w * n, k * q[1], k * q[2], k * q[3])
 
 
 @inner
@@ -120,15 +170,47 @@ def apply_transposed(m, v):
 
 
 @inner
+def _half_series(z):
+    return 0.5 - z / 24.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0 * (1.0 - z / 132.0 * (1.0 - z / 182.0)))))
+
+
+@inner
+def _sixth_series(z):
+    return (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0 * (1.0 - z / 156.0))))) / 6.0
+
+
+@lane_by_lane
+@inner
+def _half(z):
+    """(1 - cos a) / a^2, z = a^2."""
+    return _half_series(z) if z < _TURN else (1.0 - math.cos(math.sqrt(z))) / z
+
+
+@lane_by_lane
+@inner
+def _sixth(z):
+    """(a - sin a) / a^3, z = a^2."""
+    return _sixth_series(z) if z < _TURN else (1.0 - math.sin(math.sqrt(z)) / math.sqrt(z)) / z
+
+
+@inner
 def left_jacobian_transposed(theta, v):
     """J_l(theta)^T v, J_l the left Jacobian of the exponential map."""
     z = dot(theta, theta)
-    if z < 1e-6:
-        b = 0.5 - z / 24.0
-        c = 1.0 / 6.0 - z / 120.0
+    if below(z, _TURN):
+        b, c = _half_series(z), _sixth_series(z)
     else:
-        t = math.sqrt(z)
-        b = (1.0 - math.cos(t)) / z
-        c = (t - math.sin(t)) / (z * t)
+        b, c = _half(z), _sixth(z)
     w = cross(theta, v)
     return add(v, add(scale(-b, w), scale(c, cross(theta, w))))
+
+
+@inner
+def left_jacobian(theta):
+    """J_l(theta), the left Jacobian of the exponential map, as three rows."""
+    rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    return (
+        left_jacobian_transposed(theta, rows[0]),
+        left_jacobian_transposed(theta, rows[1]),
+        left_jacobian_transposed(theta, rows[2]),
+    )

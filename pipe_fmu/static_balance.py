@@ -11,7 +11,7 @@ from .line import Array, Line, Water
 from .newton import condense_top, hold_foot, hold_foot_residual, top_correction
 from .so3 import exp, multiply, normalize
 from .stability import positive
-from .static_kernel import spin, static_system
+from .static_kernel import attitude, static_system
 
 Pose = tuple[Array, Array]  # positions (n, 3) [m], attitudes (n, 4)
 
@@ -25,7 +25,7 @@ _KRYLOV = 80  # vectors they are found with
 def _turn(quaternion, x, out):
     """Attitudes after the spins of x (n, 6)."""
     for i in range(x.shape[0]):
-        turned = normalize(multiply(exp((x[i, 3], x[i, 4], x[i, 5])), spin(quaternion, i)))
+        turned = normalize(multiply(exp((x[i, 3], x[i, 4], x[i, 5])), attitude(quaternion.T, i)))
         for a in range(4):
             out[i, a] = turned[a]
 
@@ -125,15 +125,14 @@ class Factors:
         if damping > 0.0:
             self.diagonal[:, range(6), range(6)] += damping * balance.scales.metric
         hold_foot(self.line, balance.pose[1], self.diagonal, self.upper)
-        self.exchanges = np.empty((len(self.lower), 6), np.int64)
-        self.regular = bool(factorize(self.diagonal, self.lower, self.upper, self.exchanges))
+        self.regular = bool(factorize(self.diagonal, self.lower, self.upper))
 
     def correction(self, residual: Array) -> Array:
         """Displacements and spins (n, 6) that undo a residual (n, 6), to first order."""
         right, at_top, x = residual.copy(), np.empty(6), np.empty_like(residual)
-        condense(self.diagonal, self.lower, self.exchanges, right)
+        condense(self.lower, right)
         top_correction(self.line, self.diagonal[-1], right[-1], np.zeros(6), at_top)
-        substitute(self.upper, right, at_top, x)
+        substitute(self.diagonal, self.upper, right, at_top, x)
         return x
 
     def stiffness(self) -> Array:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .assembly import add_matrix, add_outer, add_vector, clear, expand, expand_matrix
+from .assembly import add_matrix, add_vector, clear, expand, expand_matrix
 from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, strains
 from .loads import add_press, add_press_stiffness, press
@@ -10,19 +10,21 @@ from .static_drag import add_static_drag
 
 
 @inner
-def chord(position, e):
-    """phi_2 - phi_1 of element e."""
-    return (
-        position[e + 1, 0] - position[e, 0],
-        position[e + 1, 1] - position[e, 1],
-        position[e + 1, 2] - position[e, 2],
-    )
+def vector_of(columns, k, at):
+    """Components k, k + 1, k + 2 of columns at a node or a group of nodes."""
+    return (columns[k, at], columns[k + 1, at], columns[k + 2, at])
 
 
 @inner
-def spin(quaternion, i):
-    """Quaternion of node i as a tuple."""
-    return (quaternion[i, 0], quaternion[i, 1], quaternion[i, 2], quaternion[i, 3])
+def attitude(quaternion, at):
+    """Quaternion, from columns, of a node or a group of nodes."""
+    return (quaternion[0, at], quaternion[1, at], quaternion[2, at], quaternion[3, at])
+
+
+@inner
+def chord(position, a, b):
+    """phi_b - phi_a from columns of positions, or of displacements."""
+    return (position[0, b] - position[0, a], position[1, b] - position[1, a], position[2, b] - position[2, a])
 
 
 @kernel
@@ -48,7 +50,7 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
     elastic, gravity, pressed = 0.0, 0.0, 0.0
     for e in range(line.length.shape[0]):
         h = line.length[e]
-        rm, u, psi = frame(spin(quaternion, e), spin(quaternion, e + 1), chord(position, e))
+        rm, u, psi = frame(attitude(quaternion.T, e), attitude(quaternion.T, e + 1), chord(position.T, e, e + 1))
         strains(rm, u, psi, h, line.share[e], strain)
         gradients(rm, u, psi, h, line.share[e], rows)
         for k in range(STRAINS):
@@ -68,7 +70,10 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
                 nine[i] += stress[k] * rows[k, i]
         geometric_stiffness(rm, u, psi, h, line.share[e], stress, square)
         for k in range(STRAINS):
-            add_outer(square, h * line.stiffness[e, k], rows[k], rows[k])
+            for i in range(9):
+                push = h * line.stiffness[e, k] * rows[k, i]
+                for j in range(9):
+                    square[i, j] += push * rows[k, j]
         expand(nine, vector)
         expand_matrix(square, matrix)
         vector[2] -= 0.5 * weight

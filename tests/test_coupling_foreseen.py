@@ -80,11 +80,12 @@ def rest():
 @pytest.mark.parametrize("mass", [1e2, 1e8])
 @pytest.mark.parametrize("state", bodies.STATES, ids=lambda state: state.name)
 def test_the_pipe_and_a_body_neither_of_which_can_roll_back_are_solved_once_a_step(rest, mass, state):
+    """What is foreseen wrongly stays small beside what happens: two thousandths of the energy exchanged, one of the motion."""
     found = bodies.run(bodies.Case("energy-consistent", mass, 0.05, state, duration=6.0, rollback=False), rest)
     assert found.finished
     assert found.solves == found.most_solves == 1
     assert found.residual <= 2e-3
-    assert found.gap_m <= 5e-3
+    assert found.gap_m <= 1e-3 * state.excursion
 
 
 def test_the_papers_scene_keeps_its_energy_with_one_solve_of_a_pipe_that_cannot_roll_back():

@@ -344,6 +344,14 @@ def test_the_top_goes_exactly_where_it_is_told():
     assert state.time == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("name", ["current", "pinned-foot"])
+def test_the_foot_stays_exactly_where_it_is_held(name):
+    """Nothing creeps in by the extrapolated guess, which no correction moves at the foot."""
+    pipe, _, start = started(scene(name))
+    states, _ = march(pipe, start, sway, 0.2, 100)
+    np.testing.assert_array_equal(states[-1].position[0], start.position[0])
+
+
 def test_a_step_that_cannot_converge_says_so_and_leaves_the_state_alone():
     pipe, _, start = started(scene("current"))
     kept = [np.array(part, copy=True) for part in start]

@@ -1,0 +1,92 @@
+"""Data of nodes and elements as the lanes take them: a quantity with k components is an array (k, p), contiguous along the line.
+
+Behind the last node the line goes on, straight on, as if it had no stiffness, weight, drag or mass: what is done there to fill the lanes
+adds nothing. p leaves room for the last lanes of nodes and, one further on, of the upper ends of elements.
+"""
+
+import numpy as np
+
+from .compiled import inner, kernel
+from .lanes import WIDTH
+from .line import Line
+
+
+@inner
+def room(n):
+    """Length p of the columns of a line of n nodes."""
+    return (n // WIDTH + 2) * WIDTH
+
+
+@inner
+def _fill(a, k, out, beyond):
+    """a[:, k] into out, and behind its end `beyond` times its last entry."""
+    m = a.shape[0]
+    for i in range(m):
+        out[i] = a[i, k]
+    for i in range(m, out.shape[0]):
+        out[i] = beyond * a[m - 1, k]
+
+
+@inner
+def fill(a, out, beyond=1.0):
+    """Transpose of a (m, k) into out (k, p), the last row of a repeated `beyond` times it."""
+    for k in range(a.shape[1]):
+        _fill(a, k, out[k], beyond)
+
+
+@inner
+def fill_straight(a, out):
+    """Transpose of positions a (m, 3) into out (3, p), going on in the direction of the last two."""
+    fill(a, out)
+    m = a.shape[0]
+    for k in range(3):
+        for i in range(m, out.shape[1]):
+            out[k, i] += (i - m + 1) * (a[m - 1, k] - a[m - 2, k])
+
+
+@inner
+def take(columns, out):
+    """Rows out (m, k) of columns (k, p)."""
+    for i in range(out.shape[0]):
+        for k in range(out.shape[1]):
+            out[i, k] = columns[k, i]
+
+
+@kernel
+def columns(a, n, beyond):
+    """Columns of a (m, k), of a line of n nodes; none of an array without rows."""
+    if a.shape[0] == 0:
+        return np.empty((a.shape[1], 0))
+    out = np.empty((a.shape[1], room(n)))
+    fill(a, out, beyond)
+    return out
+
+
+@kernel
+def column(a, n, beyond):
+    """Column (p,) of a (m,); none of an array without entries."""
+    return columns(a.reshape(a.shape[0], 1), n, beyond)[0]
+
+
+@kernel
+def line_columns(line):
+    """The line with its arrays as columns."""
+    n = line.mass.shape[0]
+    return Line(
+        column(line.length, n, 1.0),
+        columns(line.stiffness, n, 0.0),
+        columns(line.share, n, 1.0),
+        column(line.weight, n, 0.0),
+        columns(line.drag, n, 0.0),
+        column(line.diameter, n, 1.0),
+        column(line.mass, n, 0.0),
+        column(line.offset, n, 0.0),
+        columns(line.inertia, n, 0.0),
+        columns(line.spin_damping, n, 0.0),
+        columns(line.added_mass, n, 0.0),
+        column(line.damping, n, 0.0),
+        line.bed,
+        line.foot_clamped,
+        line.top_clamped,
+        line.numerical_damping,
+    )
