@@ -183,7 +183,7 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful
             guess = weights[0] * state.last[i, k] + weights[1] * state.before[i, k] + weights[2] * state.earlier[i, k]
             x[i, k] = h * guess
     for k in range(SIZE if line.foot_clamped else 3):
-        x[0, k] = 0.0  # exactly: no correction moves what is held
+        x[0, k] = 0.0  # held, and no correction would take back what the guess makes of round-off
     force, tangent = np.empty(SIZE), np.zeros((SIZE, SIZE))
     system = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n, SIZE))
     scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
