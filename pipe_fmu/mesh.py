@@ -3,8 +3,7 @@
 The element is fourth-order accurate, so its error is spread evenly where the fourth power of its length follows the second derivative of
 the bending moment m(S): the mesh equidistributes |m''|^(1/4), taken from static solutions on a fine mesh (the largest of them all where the
 top has a range), spread over the bending length sqrt(EI / T) so that it stays good when the touchdown point or the top moves, and never
-falling below a tenth of its mean. Before there is a
-solution the clamped ends are refined by their bending length. Sections begin and end at nodes.
+falling below a share of its mean. Before there is a solution the clamped ends are refined by their bending length. Sections begin and end at nodes.
 """
 
 import math
@@ -21,7 +20,7 @@ _REACH = 3.0  # its growth distance over the bending length
 _FINEST = 0.08  # never shorter than this share of the even element
 _ORDER = 4.0
 _SPREAD = 1.5  # reach of a maximum of the monitor over the bending length
-_FLOOR = 0.1  # of the monitor's mean
+_FLOOR = 0.2  # of the monitor's mean
 
 Size = Callable[[Array], Array]
 
