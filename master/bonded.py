@@ -33,7 +33,7 @@ class Bonded(OnBond):
         table, rules, bond = scene.bond, scene.coupling, wiring.bond()
         impedance, mobility = wiring.fmus[table.impedance], wiring.fmus[table.mobility]
         self.time = 0.0
-        self.units, self.remarks = wiring.fmus, Remarks()
+        self.units, self.remarks = wiring.fmus, Remarks.of_start(wiring.fmus)
         self._wires, self._macro_step = wiring.connections(), scene.simulation.macro_step
         if rules.scheme == "energy-consistent":
             self._ends = (

@@ -111,9 +111,10 @@ def _statics_table(scene: scenes_of.Scene, found: dict[str, Any]) -> str:
         return "  ".join(f"{value / 1e3:10.3f}" for value in found[key])
 
     touchdown = found["touchdown_s_m"]
+    note = "" if found["stable"] else "; not stable: the line will leave it at the least push"
     return "\n".join(
         (
-            f"Equilibrium of {scene.name}: {scene.sections.title}",
+            f"Equilibrium of {scene.name}{note}: {scene.sections.title}",
             "on the pipe                  x           y           z",
             f"  top force     {kilo('top_force_e_N')}  kN",
             f"  top moment    {kilo('top_moment_e_N_m')}  kN m",

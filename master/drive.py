@@ -90,7 +90,8 @@ class Coupled(OnBond):
     def __init__(self, pipe: Fmu, vessel: Fmu, sections: Sections) -> None:
         rules, bond = sections.coupling, hang_off()
         self.time = 0.0
-        self.units, self.remarks = {"pipe": pipe, "vessel": vessel}, Remarks()
+        self.units = {"pipe": pipe, "vessel": vessel}
+        self.remarks = Remarks.of_start(self.units)
         self._clamped = sections.pipe.get("top") != "pinned"
         if rules.scheme == "energy-consistent":
             self._pipe, self._vessel = impedance_end(pipe, bond, rollback=rules.rollback), mobility_end(vessel, bond)
@@ -140,7 +141,7 @@ class Prescribed:
         rules = sections.coupling
         self.time = 0.0
         self.units: Mapping[str, Fmu] = {"pipe": pipe}
-        self.remarks = Remarks()
+        self.remarks = Remarks.of_start(self.units)
         self._pipe, self._motion, self._mover = impedance_end(pipe, hang_off()), motion, Mover()
         mover = (self._mover, Columns(work=("supplied_work",), bond="bond_work"))
         self.ledger = Ledger([(pipe, columns(pipe, "top_work")), mover], rules.energy_check, rules.on_violation)

@@ -94,7 +94,7 @@ class Fmu:
         except Exception as error:  # as above; the FMU's own words are in the log
             folder.cleanup()
             raise FmuFailed(f"{self.name}: cannot be loaded: {self._words(str(error))}") from None
-        self.remark = ""  # the FMU's last warning about its last step
+        self.remark = ""  # the FMU's warning about its start, or about its last step
         self._close = weakref.finalize(self, _free, self._fmu, self._states, folder)  # at exit at the latest
         self._component = ctypes.c_void_p(self._fmu.component)
         self._channels: dict[Names, _Channel] = {}
@@ -119,6 +119,7 @@ class Fmu:
         for name, value in (inputs or {}).items():
             self.set(name, value)
         self._call("initialisation", self._fmu.exitInitializationMode)
+        self.remark = self._words("") if self.messages else ""
 
     def close(self) -> None:
         """Free every state, the instance and the unpacked files; safe to call twice."""

@@ -76,6 +76,7 @@ def screen(summary: Mapping[str, Any], title: str) -> str:
         ]
     left = f"the bond made {summary['interface_residual_J']:.2g} J of {summary['exchanged_energy_J']:.3g} J exchanged"
     rows += [("coupling", f"{summary['coupling']}; {left}"), ("energy check", summary["energy_check"].removeprefix("energy check "))]
+    rows += [(f"{unit} start", words) for unit, words in summary["start_remarks"].items()]
     for unit, count in summary["steps_with_remarks"].items():
         of = f"of {count} of {summary['macro_steps']} steps"
         rows.append((f"{unit} remarks", f"{of}, first: {summary['first_remarks'][unit]}"))

@@ -71,7 +71,7 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
             wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
             if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
                 recorder.record_shape(drive.time)
-            account: dict[str, Any] = {"coupling": drive.scheme}
+            account: dict[str, Any] = {"coupling": drive.scheme, "start_remarks": drive.remarks.start}
             account |= {"steps_with_remarks": drive.remarks.count, "first_remarks": drive.remarks.first}
             account |= {**_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
             account |= drive.ledger.summary()

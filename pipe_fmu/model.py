@@ -12,7 +12,7 @@ from .line import Array, Line, Water, shear_stiffness
 from .parameters import PipeParameters, Section
 from .step_kernel import element_strains
 
-_PROBE = 4  # elements of the probing mesh for one of the mesh to be made,
+_PROBE = (4, 8)  # elements of the probing mesh for one of the mesh to be made; the finer where the other finds no equilibrium,
 _PROBE_LIMIT = 2000  # as long as there are fewer than these
 _TRIES = (12, 16, 24, 32, 47, 64, 96, 128, 192, 256, 384, 512, 768, 1024)  # elements tried for a tolerance
 
@@ -49,10 +49,13 @@ def _mesh(parameters: PipeParameters, count: int) -> Array:
     if parameters.mesh == "uniform":
         return mesh.even(parameters, count)
     estimate = estimate_tension(parameters)
-    probe = mesh.graded(parameters, estimate, max(count, min(_PROBE * count, _PROBE_LIMIT)))
-    found = [_at_rest(pose, probe) for pose in _range(parameters)]
-    forces = np.array([one for one in found if one is not None])
-    if not len(forces):
+    for times in _PROBE:
+        probe = mesh.graded(parameters, estimate, max(count, min(times * count, _PROBE_LIMIT)))
+        found = [_at_rest(pose, probe) for pose in _range(parameters)]
+        forces = np.array([one for one in found if one is not None])
+        if len(forces):
+            break
+    else:
         return mesh.graded(parameters, estimate, count)
     largest = forces[:, :, :1].max(axis=1)
     tension = np.maximum(forces[:, :, 0], np.maximum(1e-3 * largest, 1e-9)).max(axis=0)

@@ -15,6 +15,7 @@ from .pipe import Pipe
 Port = tuple[int, str, str]
 
 _MOTION = "of the hang-off point, mean over the coming step, in e"
+UNSTABLE = "statics: the equilibrium is not stable; the line will leave it at the least push"
 _PULL = "of the pipe on the vessel at the hang-off point, in e"
 
 
@@ -38,7 +39,7 @@ class PipeUnit:
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
         self.state: Any = None
-        self.remark = ""  # what the host's log should say of the last step that was done
+        self.remark = ""  # what the host's log should say of the start, or of the last step that was done
         self._most = parameters.max_substeps
         self._memo: dict[str, Array] = {}
         self._memo_of: Any = None
@@ -92,6 +93,7 @@ class PipeUnit:
         still = np.zeros(3)
         self._pipe.step(state, still, still, 1e-3)  # so that compiling its kernel belongs to the start, not to the first step
         self.state = (state, found.top, found.stiffness, 0, found.residual)
+        self.remark = "" if found.stable else UNSTABLE
         return None
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:

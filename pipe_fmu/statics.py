@@ -3,6 +3,7 @@ and its top section is turned to where it is held, each time to a stable equilib
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +15,10 @@ from .so3 import conjugate, exp, log, multiply, scale
 from .static_balance import Balance, Factors, Pose, Scales
 
 _HAULED_FROM = 0.9  # of the taut distance
-_LONGEST_HAUL = 1.0 / 8.0  # of the way in, in one step,
-_SHORTEST_HAUL = 1.0 / 512.0  # and the step at which the line may fall into another shape
-_FEW = 150  # steps of descent, while the step of the haul can be shortened
-_TURN_OF_TOP = 0.35  # rad of one load step of the top section
+_LONGEST = 1.0 / 8.0  # of the way that the top is led, in one step,
+_SHORTEST = 1.0 / 512.0  # and the step at which the line may fall into another shape
+_FEW = 150  # steps of descent, while the step of the top can be shortened
+_TURN_OF_TOP = 0.35  # rad of the top section in one step
 
 
 class Equilibrium(NamedTuple):
@@ -32,6 +33,9 @@ class Equilibrium(NamedTuple):
     stable: bool  # the tangent is positive definite
     iterations: int
     residual: float
+
+
+Led = Callable[[Equilibrium, float, float], Pose]
 
 
 def solve(line: Line, s: Array, water: Water, top: tuple[float, float, float], attitude: Array | None) -> Equilibrium:
@@ -49,14 +53,13 @@ def solve(line: Line, s: Array, water: Water, top: tuple[float, float, float], a
     held = tuple(float(x) for x in attitude)
     start = tuple(float(x) for x in result.quaternion[-1])
     turn = log(multiply(held, conjugate(start)))
-    steps = max(1, math.ceil(math.hypot(*turn) / _TURN_OF_TOP))
-    for k in range(1, steps + 1):
-        quaternion = result.quaternion.copy()
-        quaternion[-1] = held if k == steps else multiply(exp(scale(k / steps, turn)), start)
-        result = equilibrium(line, water, scales, (result.position, quaternion))
-        if not result.converged:
-            break
-    return result
+
+    def turned(at: Equilibrium, reached: float, wanted: float) -> Pose:
+        quaternion = at.quaternion.copy()
+        quaternion[-1] = held if wanted == 1.0 else multiply(exp(scale(wanted, turn)), start)
+        return at.position, quaternion
+
+    return _led(line, water, scales, result, turned, min(1.0, _TURN_OF_TOP / max(math.hypot(*turn), _TURN_OF_TOP)))
 
 
 def _hung(line: Line, water: Water, scales: Scales, s: Array, top: tuple[float, float, float]) -> Equilibrium:
@@ -77,13 +80,24 @@ def _hauled(line: Line, water: Water, scales: Scales, s: Array, top: tuple[float
     away = (reach * math.cos(heading), reach * math.sin(heading), top[2])
     result = _hung(line, water, scales, s, away)
     way = np.outer(s / s[-1], np.array(top) - away)
-    reached, step = 0.0, _LONGEST_HAUL
-    while result.stable and reached < 1.0:
+
+    def hauled(at: Equilibrium, reached: float, wanted: float) -> Pose:
+        return at.position + (wanted - reached) * way, at.quaternion
+
+    return _led(line, water, scales, result, hauled, _LONGEST)
+
+
+def _led(line: Line, water: Water, scales: Scales, result: Equilibrium, pose: Led, longest: float) -> Equilibrium:
+    """Equilibrium at the end of the way that the top is led, in steps shortened where the line would leave the stable shape it is in.
+
+    pose: where the line starts from for the part `wanted` of the way, from the equilibrium at the part `reached`.
+    """
+    reached, step = 0.0, longest
+    while result.converged and reached < 1.0:
         wanted = min(1.0, reached + step)
-        start = result.position + (wanted - reached) * way, result.quaternion
-        trial = equilibrium(line, water, scales, start, _FEW if step > _SHORTEST_HAUL else DESCENTS)
-        if trial.stable or step <= _SHORTEST_HAUL:
-            reached, result, step = wanted, trial, min(1.5 * step, _LONGEST_HAUL)
+        trial = equilibrium(line, water, scales, pose(result, reached, wanted), _FEW if step > _SHORTEST else DESCENTS)
+        if trial.stable or not result.stable or step <= _SHORTEST:
+            reached, result, step = wanted, trial, min(1.5 * step, longest)
         else:
             step *= 0.5
     return result

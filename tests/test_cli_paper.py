@@ -9,6 +9,7 @@ import pytest
 from master import scene
 from master.__main__ import main
 from master.monolithic import march
+from pipe_fmu import Pipe
 
 
 @pytest.fixture(scope="module")
@@ -64,9 +65,29 @@ def test_the_files_promised_are_there(results):
     assert sorted(name[:4] for name in names if name.startswith("fig")) == [f"fig{n}" for n in range(3, 10)]
 
 
-def test_the_fmus_agree_with_both_models_solved_as_one(results):
-    _, _, moments = march(scene.load("paper"))
-    *_, last = moments
+@pytest.fixture(scope="module")
+def together():
+    """The last moment of pipe and vessel solved as one, and the corrections of every step of the pipe."""
+    corrections, step = [], Pipe.step
+
+    def counted(*arguments, **options):
+        result = step(*arguments, **options)
+        corrections.append(result.iterations)
+        return result
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Pipe, "step", counted)
+        *_, last = march(scene.load("paper"))[2]
+    return last, corrections
+
+
+def test_newton_takes_at_most_four_corrections_from_the_extrapolated_last_step(together):
+    assert len(together[1]) >= 3000
+    assert max(together[1]) <= 4
+
+
+def test_the_fmus_agree_with_both_models_solved_as_one(results, together):
+    last, _ = together
     with np.load(results / "shapes.npz") as shapes:
         assert shapes["t"][-1] == pytest.approx(last.time, abs=1e-9)
         np.testing.assert_allclose(shapes["position"][-1], last.pipe.position, rtol=0.0, atol=1e-6)

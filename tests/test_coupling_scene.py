@@ -182,9 +182,12 @@ def test_an_fmu_that_crashes_leaves_its_results_so_far_and_a_summary_that_says_s
     assert "signals.csv" in summary["message"]
 
 
-def test_what_a_unit_says_of_its_steps_is_in_the_report(folder, tmp_path, capsys):
+def test_what_a_unit_says_of_its_start_and_of_its_steps_is_in_the_report(folder, tmp_path, capsys):
     code, summary = ran(folder, tmp_path, failing("remark"))
     assert code == 0
     assert summary["steps_with_remarks"] == {"coil": 30}
     assert summary["first_remarks"] == {"coil": "planted remark, 50 % heard"}
-    assert "coil remarks  of 30 of 50 steps, first: planted remark, 50 % heard" in capsys.readouterr().out
+    assert summary["start_remarks"] == {"coil": "planted at the start, 10 % heard"}
+    out = capsys.readouterr().out
+    assert "coil start    planted at the start, 10 % heard" in out
+    assert "coil remarks  of 30 of 50 steps, first: planted remark, 50 % heard" in out

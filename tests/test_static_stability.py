@@ -7,7 +7,7 @@ import pytest
 from pipe_helpers import STILL, bar, pitch, rotation, static_system, turned
 from statics_grid import scenes
 
-from pipe_fmu import Pipe
+from pipe_fmu import Pipe, PipeUnit
 from pipe_fmu.element import frame
 from pipe_fmu.loads import add_drag
 from pipe_fmu.relaxation import DESCENTS, descend, newton
@@ -119,3 +119,12 @@ def test_a_column_past_eulers_load_buckles_to_a_stable_shape_of_less_energy():
     assert found.stable
     assert found.balance.potential < rest.balance.potential
     assert found.balance.top[2] == pytest.approx(20.1907 * bending / length**2, rel=5e-3)
+
+
+def test_a_unit_that_starts_in_an_equilibrium_that_is_not_stable_says_so(monkeypatch):
+    unit, found = PipeUnit(SCENES[33].parameters), Pipe(SCENES[33].parameters).start(0.0)
+    assert unit.initialize(0.0, {}) is None
+    assert not unit.remark
+    monkeypatch.setattr(Pipe, "start", lambda self, time: (found[0]._replace(stable=False), found[1]))
+    assert unit.initialize(0.0, {}) is None
+    assert "not stable" in unit.remark

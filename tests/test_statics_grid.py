@@ -10,18 +10,9 @@ from pipe_helpers import pitch, rotation, started
 from statics_grid import equilibrium, scenes
 
 SCENES = scenes()
-OPEN = {  # none found yet, nor shown not to exist: slack on a bed without friction, of which hardly any energy tells one shape from another
-    151: "cable in a uniform current against its foot: does not come to rest",
-    191: "hose: hangs stably, comes to rest with its top turned but not stably",
-}
 
 
-def scene(number):
-    marks = [pytest.mark.xfail(strict=False, reason=OPEN[number])] if number in OPEN else []
-    return pytest.param(SCENES[number], marks=marks, id=SCENES[number].name)
-
-
-@pytest.mark.parametrize("scene", [scene(number) for number in range(len(SCENES))])
+@pytest.mark.parametrize("scene", SCENES, ids=[scene.name for scene in SCENES])
 def test_a_line_finds_a_stable_equilibrium_with_its_top_hanging_and_turned(scene):
     pipe, hung, held = equilibrium(scene)
     assert hung.converged
@@ -59,14 +50,17 @@ def test_a_hanging_line_of_the_grid_is_that_of_the_boundary_value_problem(number
 
 @pytest.mark.parametrize("number", [24, 36, 66, 72, 78, 99, 102])
 def test_a_turned_line_of_the_grid_is_that_of_the_boundary_value_problem(number):
-    """Top section turned in the line's plane by 30 or 60 degrees either way, on a mesh made for it: the top's force, and its moment.
+    """Top section turned in the line's plane by 30 or 60 degrees either way, on 64 nodes placed for it: the top's force, and its moment.
+
+    The largest error, 9e-5 for the top of a taut line turned by 30 degrees (99: sheared by 3e-3), is that of measuring the extension along
+    the centreline and not along t_1, as element.py states; 768 nodes leave 7.6e-5.
 
     A short, stiff line that is pressed together (93) rests bent to either side, and which it is depends on its mesh: not among these.
     """
     _, hung, _ = equilibrium(SCENES[number])
     first = rotation(hung.quaternion[-1])[:, 0]
     angle = math.atan2(-first[2], first[0]) + SCENES[number].turn[1]
-    _, held, _ = started(replace(SCENES[number].parameters, top_quaternion=pitch(angle)))
+    _, held, _ = started(replace(SCENES[number].parameters, nodes=64, top_quaternion=pitch(angle)))
     _, _, force, moment, _, _ = solution(number, angle).at([SCENES[number].parameters.length])
     assert held.stable
     assert np.linalg.norm(held.top[:3] - force[:, 0]) < 1e-4 * np.linalg.norm(force)

@@ -114,6 +114,7 @@ class UnitSlave(Fmi2Slave):
             self.phase = "not initialised"  # for another try with better parameters
             raise
         self.phase = "initialised"
+        self._warn()
 
     @guarded
     def terminate(self) -> None:
@@ -129,9 +130,13 @@ class UnitSlave(Fmi2Slave):
         message = self._step(current_time, step_size)
         if message is not None:
             self.log(printable(message), Fmi2Status.discard)
-        elif remark := getattr(self.unit, "remark", ""):
-            self.log(printable(remark), Fmi2Status.warning)
+        else:
+            self._warn()
         return message is None
+
+    def _warn(self) -> None:
+        if remark := getattr(self.unit, "remark", ""):
+            self.log(printable(remark), Fmi2Status.warning)
 
     def _step(self, time: float, step: float) -> str | None:
         if self.phase != "initialised":
