@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import islice
 
 import numpy as np
 
@@ -20,33 +21,34 @@ class Extrapolation:
         self._start = np.concatenate([flow, effort])
         self._n, self._norm = flow.size, norm
         self._nodes: deque[float] = deque(maxlen=HIGHEST_ORDER + 1)  # the latest first
-        self._points: deque[Vector] = deque(maxlen=HIGHEST_ORDER + 1)
+        self._differences: list[Vector] = []  # divided ones, of order 0, 1, ... from the latest node back
         self._errors = [0.0] * (HIGHEST_ORDER + 1)
 
     def at(self, time: float) -> tuple[Vector, Vector]:
         """Flow and effort expected as the mean over a step with this middle."""
-        if not self._nodes:
-            return self._start[: self._n], self._start[self._n :]
-        best = min(range(len(self._nodes)), key=self._errors.__getitem__)
-        value = np.array(self._weights(time, best)) @ np.array(self._points)
+        value = self._start
+        if self._differences:
+            best = min(range(len(self._differences)), key=self._errors.__getitem__)
+            *_, value = islice(self._orders(time), best + 1)
         return value[: self._n], value[self._n :]
 
     def add(self, time: float, flow: Vector, effort: Vector) -> None:
         """Take in an accepted step and judge the orders by it."""
-        if self._nodes:
-            weights = [self._weights(time, order) for order in range(len(self._nodes))]
-            missed = effort - (np.array(weights) @ np.array(self._points))[:, self._n :]
+        if self._differences:
+            missed = effort - np.array([value[self._n :] for value in self._orders(time)])
             for order, error in enumerate(self._norm(missed).tolist()):
                 self._errors[order] = max(error, MEMORY * self._errors[order])
+        found = [np.concatenate([flow, effort])]
+        for node, older in zip(self._nodes, self._differences[:HIGHEST_ORDER], strict=False):
+            found.append((found[-1] - older) / (time - node))
         self._nodes.appendleft(time)
-        self._points.appendleft(np.concatenate([flow, effort]))
+        self._differences = found
 
-    def _weights(self, time: float, order: int) -> list[float]:
-        """Lagrange's weights of the points, zero for those that the order does not use."""
-        nodes, weights = self._nodes, [0.0] * len(self._nodes)
-        for i in range(order + 1):
-            weights[i] = 1.0
-            for j in range(order + 1):
-                if j != i:
-                    weights[i] *= (time - nodes[j]) / (nodes[i] - nodes[j])
-        return weights
+    def _orders(self, time: float) -> Iterator[Vector]:
+        """The values extrapolated with rising order, by Newton's form."""
+        value, product = self._differences[0], 1.0
+        yield value
+        for node, difference in zip(self._nodes, self._differences[1:], strict=False):
+            product *= time - node
+            value = value + product * difference
+            yield value
