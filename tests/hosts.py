@@ -74,10 +74,10 @@ def reference(name: str, changes: Sequence[str], step: float, end: float) -> Arr
     return np.array(rows)[:: round(SPACING / step)][1:]
 
 
-def exchange(exported: Path, times: Sequence[float], pulled: bool = True) -> Array:
+def exchange(exported: Path, times: Sequence[float]) -> Array:
     """Rows as of `run` of the parallel exchange that a host without iteration must do, by FMI calls of our own, in steps to `times`.
 
-    Each unit holds over a step what the other had at its beginning, by the wires of system.ssp; not `pulled`: zeros in the first step.
+    Each unit holds over a step what the other had at its beginning, by the wires of the OSP structure.
     """
     flows, efforts = ("end_velocity", "end_angular_velocity"), ("force", "moment")
     with Fmu(exported / "pipe.fmu", "pipe") as pipe, Fmu(exported / "vessel.fmu", "vessel") as vessel:
@@ -86,7 +86,7 @@ def exchange(exported: Path, times: Sequence[float], pulled: bool = True) -> Arr
         vessel.initialize(inputs=dict(zip(efforts, (pull[:3], pull[3:]), strict=True)))
         rows, now = [], 0.0
         for after in times:
-            flow, pull = vessel.get(flows), pipe.get(efforts) if pulled or rows else np.zeros(6)
+            flow, pull = vessel.get(flows), pipe.get(efforts)
             pipe.set(("velocity", "angular_velocity"), flow)
             vessel.set(efforts, pull)
             pipe.step(now, after - now, final=True)

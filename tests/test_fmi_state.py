@@ -3,13 +3,16 @@ that what an exported FMU says of itself is so."""
 
 import gc
 import os
+import runpy
 import subprocess
 import sys
 import time
+import weakref
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
+import c_host
 import fmpy
 import numpy as np
 import pytest
@@ -117,7 +120,8 @@ def test_instances_of_two_exports_keep_apart_in_one_process(exported, small):
         assert c.port("node_tension").size == 6 != a.port("node_tension").size
 
 
-def test_many_lives_of_an_instance_hold_memory(small):
+@pytest.mark.parametrize("unit", UNITS)
+def test_many_lives_of_an_instance_hold_memory(small, exported, unit):
     """Blocks of Python's memory tell a leak of one object a life; the resident memory what else was not given back."""
 
     def resident() -> int:
@@ -125,7 +129,7 @@ def test_many_lives_of_an_instance_hold_memory(small):
 
     def live(count: int) -> tuple[int, int]:
         for _ in range(count):
-            with Fmu(small) as fmu:
+            with Fmu(small if unit == "pipe" else exported / "vessel.fmu") as fmu:
                 fmu.initialize()
                 state = fmu.snapshot()
                 walk(fmu, 0, 2)
@@ -141,6 +145,28 @@ def test_many_lives_of_an_instance_hold_memory(small):
     more_blocks, more_memory = live(60)
     assert more_blocks - blocks < 60 * 4
     assert more_memory - memory < 60 * 8e3  # bytes
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_an_instance_is_gone_when_it_is_let_go(exported, unit, tmp_path):
+    """It holds no reference to itself: a process with many lives does not grow until its garbage collector comes."""
+    resources = str(c_host.unpacked(exported / f"{unit}.fmu", tmp_path / "unit") / "resources")
+    server = runpy.run_path(f"{resources}/runtime.py")["load"](resources).__self__
+    slave = server.slave_class(instance_name="it", resources=resources, visible=False)
+    gc.disable()
+    try:
+        slave.setup_experiment(0.0)
+        slave.enter_initialization_mode()
+        slave.exit_initialization_mode()
+        state = slave._get_fmu_state()
+        assert slave.do_step(0.0, STEP)
+        slave.get_real([i for i, variable in enumerate(slave.variables()) if variable.causality == "output"])
+        slave._set_fmu_state(state)
+        living = weakref.ref(slave)
+        del slave
+        assert living() is None
+    finally:
+        gc.enable()
 
 
 # what it says of itself

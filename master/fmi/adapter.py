@@ -38,8 +38,6 @@ BROKEN_ARITHMETIC = (ArithmeticError, ValueError, np.linalg.LinAlgError)  # a fa
 LONGEST_TEXT = 10_000_000  # characters; a table of all nodes takes a fifth of it
 TIME_TOLERANCE = 1e-6  # of a step: hosts add up their time in ways of their own
 
-Reader = Callable[[], list[Any]]
-
 
 class Snapshot(NamedTuple):
     """Everything a rollback needs; the unit's state is an immutable value, so this is a handful of references."""
@@ -84,7 +82,7 @@ class UnitSlave(Fmi2Slave):
         self.changed: dict[str, Any] = {}  # parameters set by the host; replaced, never mutated
         self.phase, self.time = "not initialised", 0.0
         self.unit: Any = None
-        self._readers: dict[tuple[object, ...], list[Reader]] = {}
+        self._runs: dict[tuple[object, ...], list[Run]] = {}
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """PythonFMU's frame, completed."""
@@ -175,10 +173,10 @@ class UnitSlave(Fmi2Slave):
 
     def _get(self, kind: str, vrs: list[int]) -> list[Any]:
         key = (kind, *vrs)
-        readers = self._readers.get(key)
-        if readers is None:  # hosts repeat themselves: the runs of a request are found once
-            readers = self._readers[key] = [self._reader(run) for run in self.ports.runs(vrs, kind)]
-        return readers[0]() if len(readers) == 1 else [value for read in readers for value in read()]
+        runs = self._runs.get(key)
+        if runs is None:  # hosts repeat themselves: the runs of a request are found once
+            runs = self._runs[key] = list(self.ports.runs(vrs, kind))
+        return self._read(runs[0]) if len(runs) == 1 else [value for run in runs for value in self._read(run)]
 
     def _set(self, kind: str, vrs: list[int], values: Sequence[Any]) -> None:
         """All of them or, where one is refused, none."""
@@ -203,18 +201,14 @@ class UnitSlave(Fmi2Slave):
         if self.phase != "initialised":
             self.unit = None
 
-    def _reader(self, run: Run) -> Reader:
-        name, part = run.name, run.part
-        if run.causality == "parameter":
-            return lambda: [self.changed.get(name, self.ports.parameters[name].value)]
-        if run.causality == "input":
-            return lambda: self.inputs[self.ports.input_slices[name]][part].tolist()
-
-        def read() -> list[float]:
+    def _read(self, run: Run) -> list[Any]:
+        causality, name, part = run
+        if causality == "output":
             unit = self.unit
             return (self._ready() if unit is None else unit).output(name)[part].tolist()
-
-        return read
+        if causality == "input":
+            return self.inputs[self.ports.input_slices[name]][part].tolist()
+        return [self.changed.get(name, self.ports.parameters[name].value)]
 
     # state
 
