@@ -29,7 +29,7 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
     at = statics.released(scene, rest)
     simulation = scene.sections.simulation
     experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
-    pull = (-at.found.top).tolist()
+    pull = (0.0 - at.found.top).tolist()  # no -0.0 among them
     pipe = replace(at.pipe, reference_force=tuple(pull[:3]), reference_moment=tuple(pull[3:]))
     units: dict[str, tuple[Any, str, Any]] = {"pipe": (pipe_fmu, "slave.PipeUnit", pipe)}
     if at.vessel is not None:

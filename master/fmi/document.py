@@ -61,7 +61,7 @@ def _ports(model: Element, causality: str) -> list[list[str]]:
         if variable.get("causality") != causality:
             continue
         name = re.sub(r"\[\d+\]$", "", variable.get("name", ""))
-        value = variable[0].get("start", "") if causality == "parameter" else ""
+        value = variable[0].get("start", "")
         units.setdefault(name, {})[variable[0].get("unit", "")] = None
         if name in rows:
             rows[name][1] = str(int(rows[name][1]) + 1)
@@ -70,6 +70,8 @@ def _ports(model: Element, causality: str) -> list[list[str]]:
             rows[name] = [name, "1", "", value, variable.get("description", "")]
     for name, row in rows.items():
         row[2] = ", ".join(units[name])
+        if causality == "input" and not any(map(float, row[3].split(", "))):
+            row[3] = ""  # zero goes without saying
     return list(rows.values())
 
 
