@@ -2,6 +2,7 @@
 that what an exported FMU says of itself is so."""
 
 import gc
+import importlib
 import os
 import runpy
 import subprocess
@@ -17,12 +18,14 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
+from numba import types
 
 import pipe_fmu
 from master.__main__ import main
-from master.fmi.build import Recipe, build_fmu
+from master.fmi.build import Recipe, build_fmu, bundled_package
 from master.fmi.description import base_unit
 from master.fmu import Fmu, FmuFailed
+from pipe_fmu.state import PipeState
 
 STEP = 0.1
 UNITS = ("pipe", "vessel")
@@ -119,6 +122,16 @@ def test_instances_of_two_exports_keep_apart_in_one_process(exported, small):
             np.testing.assert_array_equal(walk(b, i, 1)[0], first[i])
             walk(c, i, 1)
         assert c.port("node_tension").size == 6 != a.port("node_tension").size
+
+
+def test_pipes_of_two_packages_are_two_types_to_the_compiler(exported):
+    """Else a kernel compiled where an FMU was first would be kept with the FMU's type in it, and fail in processes without the FMU."""
+    bundled = importlib.import_module(f"{bundled_package(exported / 'pipe.fmu').__name__}.state")
+    tuples = []  # alive together: numba lets equal names be one type
+    for cls in (bundled.PipeState, PipeState):
+        state = types.NamedTuple([types.float64] * len(cls._fields), cls)
+        tuples.append(types.Tuple([types.boolean, state]))
+        assert state in tuples[-1].dtype.types
 
 
 @pytest.mark.parametrize("unit", UNITS)
