@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +29,21 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
     at = statics.released(scene, rest)
     simulation = scene.sections.simulation
     experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
-    units: dict[str, tuple[Any, str, Any]] = {"pipe": (pipe_fmu, "slave.PipeUnit", at.pipe)}
+    pull = (0.0 - at.found.top).tolist()  # no -0.0 among them
+    pipe = replace(at.pipe, reference_force=tuple(pull[:3]), reference_moment=tuple(pull[3:]))
+    units: dict[str, tuple[Any, str, Any]] = {"pipe": (pipe_fmu, "slave.PipeUnit", pipe)}
     if at.vessel is not None:
         units["vessel"] = (vessel_fmu, "slave.VesselUnit", at.vessel)
+    held = {"vessel": {"force": pull[:3], "moment": pull[3:]}}
     recipes = {
-        name: Recipe(Path(package.__file__).parent, unit, to_mapping(parameters), experiment=experiment, portable=portable)
+        name: Recipe(
+            Path(package.__file__).parent,
+            unit,
+            to_mapping(parameters),
+            experiment=experiment,
+            inputs=held.get(name, {}),
+            portable=portable,
+        )
         for name, (package, unit, parameters) in units.items()
     }
     fmus = {

@@ -24,6 +24,8 @@ UNIT_TABLES = ("environment", "pipe", "vessel")
 FOUND = {
     "pipe.top_position": "follows from [start]",
     "pipe.top_quaternion": "follows from [start]",
+    "pipe.reference_force": "is found by the statics",
+    "pipe.reference_moment": "is found by the statics",
     "pipe.nodes_at": "follows from nodes, tolerance and mesh",
     "pipe.environment": "is the table [environment]",
     "vessel.environment": "is the table [environment]",

@@ -12,8 +12,8 @@ BOUNDS = {
 }
 
 
-def number(default: Any, unit: str, doc: str, **bounds: float) -> Any:
-    """Dataclass field holding a number or a fixed tuple of numbers in `unit`, within `bounds` (above, min, below, max)."""
+def number(default: Any, unit: str | tuple[str, ...], doc: str, **bounds: float) -> Any:
+    """Dataclass field holding a number or a fixed tuple of numbers in `unit`, or in one each, within `bounds` (above, min, below, max)."""
     return field(default=default, metadata={"unit": unit, "doc": doc, **bounds})
 
 
@@ -39,7 +39,7 @@ def check_fields(instance: Any) -> None:
 def check_number(name: str, value: Any, metadata: Any) -> None:
     """Raise ValueError if `value` is no finite real number within the bounds of `metadata`."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        unit = metadata["unit"]
+        unit = metadata["unit"] if isinstance(metadata["unit"], str) else ", ".join(metadata["unit"])
         raise ValueError(f"{name} = {value!r}: must be a number" + (f" ({unit})" if unit not in ("", "1") else ""))
     if not math.isfinite(value):
         raise ValueError(f"{name} = {value}: must be finite")

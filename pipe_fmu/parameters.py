@@ -162,6 +162,8 @@ class PipeParameters:
     internal_damping: float = number(0.0, "s", "Kelvin-Voigt time: viscous section forces are this times C strain rate", min=0.0)
     numerical_damping: float = number(0.0, "1", "algorithmic dissipation: 0 none, 0.5 backward Euler on the strains", min=0.0, max=0.5)
     max_substeps: int = number(1, "1", "parts of a step that does not converge, a power of 3: for hosts without rollback", min=1, max=729)
+    reference_force: Vector3 = number((0.0, 0.0, 0.0), "N", "from which force_change counts, in e: an export's pull at rest")
+    reference_moment: Vector3 = number((0.0, 0.0, 0.0), "N.m", "from which moment_change counts, in e: an export's pull at rest")
     added_mass: AddedMass | None = None
     seabed: Seabed | None = None
     environment: Environment = field(default_factory=Environment, metadata={"doc": "sea and gravity"})

@@ -12,11 +12,18 @@ from .model import resolve
 from .parameters import PipeParameters
 from .pipe import Pipe
 
-Port = tuple[int, str, str]
+Port = tuple[int, str | tuple[str, ...], str]
 
 _MOTION = "of the hang-off point, mean over the coming step, in e"
 UNSTABLE = "statics: the equilibrium is not stable; the line will leave it at the least push"
 _PULL = "of the pipe on the vessel at the hang-off point, in e"
+_MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) + 3 * ("rad/(N.m.s)",))
+_IMPEDANCE = 3 * (3 * ("N.s/m",) + 3 * ("N.s/rad",)) + 3 * (3 * ("N.s",) + 3 * ("N.m.s/rad",))
+_AT_LEAST_ZERO = (
+    "kinetic_energy", "elastic_energy", "contact_energy", "drag_dissipation", "rotational_dissipation", "contact_dissipation",
+    "internal_dissipation", "numerical_dissipation", "pipe_length", "largest_bending_moment", "largest_von_mises", "newton_iterations",
+    "newton_residual", "s",
+)  # fmt: skip
 
 
 class PipeUnit:
@@ -30,17 +37,19 @@ class PipeUnit:
         "angular_velocity": (3, "rad/s", f"angular velocity {_MOTION}"),
         "mobility": (
             36,
-            "",
+            _MOBILITY,
             "zero, or what the hang-off point yields to the pull: d(velocities) / d(force, moment), row by row, SI; "
             "the velocities are then those without a pull",
         ),
     }
+    RANGES: ClassVar[dict[str, tuple[float | None, float | None]]] = dict.fromkeys(_AT_LEAST_ZERO, (0.0, None))
 
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
         self.state: Any = None
         self.remark = ""  # what the host's log should say of the start, or of the last step that was done
         self._most = parameters.max_substeps
+        self._reference = np.array([*parameters.reference_force, *parameters.reference_moment])
         self._memo: dict[str, Array] = {}
         self._memo_of: Any = None
 
@@ -51,13 +60,15 @@ class PipeUnit:
         ports: dict[str, Port] = {
             "force": (3, "N", f"force {_PULL}, mean over the step"),
             "moment": (3, "N.m", f"moment {_PULL}, mean over the step"),
+            "force_change": (3, "N", f"force {_PULL}, mean over the step, less reference_force"),
+            "moment_change": (3, "N.m", f"moment {_PULL}, mean over the step, less reference_moment"),
             "end_force": (3, "N", f"force {_PULL}, at the end of the step"),
             "end_moment": (3, "N.m", f"moment {_PULL}, at the end of the step"),
             "top_velocity": (3, "m/s", "velocity of the top, mean over the step, in e"),
             "top_angular_velocity": (3, "rad/s", "angular velocity of the top, mean over the step, in e"),
             "top_position": (3, "m", "position of the top, in e"),
             "top_quaternion": (4, "1", "attitude of the top section, scalar first"),
-            "impedance": (36, "N.s/m", "d(force, moment on the pipe) / d(velocity, angular velocity), row by row; of the last sub-step"),
+            "impedance": (36, _IMPEDANCE, "d(force, moment on the pipe) / d(velocity, angular velocity), row by row; of the last sub-step"),
             "kinetic_energy": (1, "J", "kinetic energy"),
             "elastic_energy": (1, "J", "strain energy"),
             "gravity_energy": (1, "J", "potential energy of the submerged weight, zero at the bed"),
@@ -84,6 +95,13 @@ class PipeUnit:
             "node_shear": (2 * n, "N", "shear forces at the nodes, material components"),
         }
         return ports
+
+    @staticmethod
+    def nominal(parameters: PipeParameters) -> dict[str, float]:
+        """Orders of magnitude by unit of measure: the length, the pipe's weight in air at an arm of a metre, steel's stress."""
+        mass = sum(section.mass_per_length * (section.length or parameters.length) for section in parameters.all_sections)
+        weight = mass * parameters.environment.gravity
+        return {"m": parameters.length, "m/s": 1.0, "rad/s": 0.1, "N": weight, "N.m": weight, "J": weight, "Pa": 1e8}
 
     def initialize(self, time: float, inputs: dict[str, Array]) -> str | None:
         """Find the static equilibrium; a message if there is none."""
@@ -134,6 +152,8 @@ class PipeUnit:
         memo = self._memo
         if name in ("force", "moment"):
             memo["force"], memo["moment"] = -top[:3], -top[3:]
+        elif name in ("force_change", "moment_change"):
+            memo["force_change"], memo["moment_change"] = -top[:3] - self._reference[:3], -top[3:] - self._reference[3:]
         elif name in ("top_velocity", "top_angular_velocity"):
             memo["top_velocity"], memo["top_angular_velocity"] = state.last[-1, :3], state.last[-1, 3:]
         elif name == "top_position":

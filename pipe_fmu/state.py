@@ -22,3 +22,7 @@ class PipeState(NamedTuple):
     earlier: Array  # (n, 6) and of the one before that
     top_work: float  # work done on the pipe at its top since the start [J]
     works: Array  # (6,) work or dissipation since the start [J], in the order of WORKS
+
+
+# numba knows a type within a tuple by its name: a pipe of another package in the process (an FMU brings its own) must not pass for this
+PipeState.__name__ = f"{__package__}.{PipeState.__name__}"

@@ -17,6 +17,8 @@ from typing import Any, NamedTuple
 import fmpy
 from fmpy import fmi2
 
+from master.fmi.adapter import LONGEST_TEXT
+
 OK, DISCARD, ERROR = 0, 2, 3
 GOOD, BAD = (OK,), (DISCARD, ERROR)
 BATCH = 150  # calls on one pair of instances
@@ -171,6 +173,11 @@ class Caller:
             self.call("SetString", (ctypes.c_uint * 1)(reference), 1, (ctypes.c_char_p * 1)(b""))
             return status, (*GOOD, *BAD)
         return status, BAD
+
+    def set_too_long_text(self) -> Answer:
+        reference = next(v.valueReference for v in self.variables if v.name == "configuration")
+        text = (ctypes.c_char_p * 1)(b" " * (LONGEST_TEXT + 1))
+        return self.call("SetString", (ctypes.c_uint * 1)(reference), 1, text), BAD
 
     def derivatives(self) -> Answer:
         one, value = (ctypes.c_uint * 1)(0), (ctypes.c_double * 1)()

@@ -39,7 +39,7 @@ def own(folder: Path, step: float, end: float) -> Rows:
 
 
 def fmpy_ssp(folder: Path, step: float, end: float) -> Rows:
-    """FMPy's simulation of the SSP file: a fixed step, all inputs zero in the first."""
+    """FMPy's simulation of the SSP file: a fixed step, all connected inputs zero in the first."""
     from fmpy.ssp.simulation import simulate_ssp
 
     result = simulate_ssp(str(folder / "system.ssp"), stop_time=end - 0.5 * step, step_size=step)
@@ -95,16 +95,19 @@ def ecos(folder: Path, step: float, end: float) -> Rows:
 
 
 def cofmupy(folder: Path, step: float, end: float) -> Rows:
-    """CoFmuPy on the FMUs (Jacobi); its inputs start at zero, so the pipe's pull at rest is given to the vessel as initial values."""
+    """CoFmuPy on the FMUs (Jacobi), by the wires of the OSP structure.
+
+    It puts zeros into all inputs, also those without a connection, unless told otherwise: here the start values they have in the FMU.
+    """
     import fmpy
     from cofmupy import Coordinator
 
     wires = [(f"{out}[{i}]", f"{held}[{i}]", f"{effort}[{i}]") for out, held, effort in BOND for i in "123"]
     pulls = [effort for _, _, effort in wires]
-    rest = fmpy.simulate_fmu(str(folder / "pipe.fmu"), stop_time=1e-3, output_interval=1e-3, output=pulls)[0]
     connections = [("vessel", out, "pipe", held) for out, held, _ in wires] + [("pipe", pull, "vessel", pull) for pull in pulls]
     fmus = [{"id": name, "path": f"{folder}/{name}.fmu", "initialization": {}} for name in ("pipe", "vessel")]
-    fmus[1]["initialization"] = {pull: float(rest[pull]) for pull in pulls}
+    vessel = fmpy.read_model_description(str(folder / "vessel.fmu"), validate=False)
+    fmus[1]["initialization"] = {variable.name: float(variable.start) for variable in vessel.modelVariables if variable.name in pulls}
     coordinator = Coordinator()
     coordinator.start({
         "fmus": fmus,

@@ -18,11 +18,19 @@ PIPE = Recipe(Path(pipe_fmu.__file__).parent, "slave.PipeUnit", {"nodes": 6})
 VESSEL = Recipe(Path(vessel_fmu.__file__).parent, "slave.VesselUnit", {})
 
 
-@pytest.mark.parametrize(("recipe", "seed"), [(SPRING, 0), (VESSEL, 1), (PIPE, 2), (PIPE, 3)], ids=["spring", "vessel", "pipe", "pipe-2"])
-def test_no_sequence_of_calls_ends_the_process_or_passes_for_good_where_it_is_not(recipe, seed, tmp_path):
+RUNS = [
+    pytest.param(SPRING, 0, {}, id="spring"),
+    pytest.param(VESSEL, 1, {}, id="vessel"),
+    pytest.param(PIPE, 2, {}, id="pipe"),
+    pytest.param(PIPE, 3, {"PIPELAY_PYTHON": sys.executable}, id="pipe in a process of its own"),
+]
+
+
+@pytest.mark.parametrize(("recipe", "seed", "given"), RUNS)
+def test_no_sequence_of_calls_ends_the_process_or_passes_for_good_where_it_is_not(recipe, seed, given, tmp_path):
     fmu = build_fmu(recipe, tmp_path / "with spaces" / "unit.fmu")
     command = [sys.executable, str(PROGRAM), str(fmu), str(seed), str(SECONDS)]
-    environment = {**os.environ, "TMPDIR": str(fmu.parent)}
+    environment = {**os.environ, "TMPDIR": str(fmu.parent), **given}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300.0 + SECONDS)
     last = done.stderr[done.stderr.rfind("instantiate") :]
     assert done.returncode == 0, f"seed {seed}, exit code {done.returncode}, calls:\n{last}"

@@ -92,15 +92,9 @@ def test_our_master_needs_no_extrapolation(hosted, exported, exact):
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("host", ["libcosim", "ecos", "cofmupy"])
+@pytest.mark.parametrize("host", ["fmpy_ssp", "libcosim", "ecos", "cofmupy"])
 def test_a_host_of_fixed_steps_does_the_parallel_exchange(host, step, hosted, exported, exchanged):
     np.testing.assert_allclose(hosted(host, exported, step)[:, 1:], exchanged[step][:, 1:], rtol=ROUND_OFF, atol=ROUND_OFF)
-
-
-def test_fmpy_simulates_the_ssp_with_zeros_in_the_first_step(hosted, exported):
-    """It lets go of the vessel for that step; from there on it does the parallel exchange."""
-    rows = hosted("fmpy_ssp", exported, STEPS[0])
-    np.testing.assert_allclose(rows[:, 1:], exchange(exported, rows[:, 0], pulled=False)[:, 1:], rtol=ROUND_OFF, atol=ROUND_OFF)
 
 
 @pytest.mark.parametrize("host", ["ecco_file", "ecco"])

@@ -132,7 +132,7 @@ class VesselParameters:
     hang_off: Vector3 = number((0.0, 0.0, 0.0), "m", "hang-off point r_t from the CG, in b")
     departure_angle: float = number(1.1760, "rad", "alpha of R_b^t = R_y(-alpha): pitch of the held pipe over the bow direction")
     departure_rotation: Vector3 = number((0.0, 0.0, 0.0), "rad", "rotation vector in b applied to the held section after alpha")
-    hold_force: Vector3 = number((0.0, 0.0, 0.0), "N", "constant thrust until the controller starts: x, y in e, yaw moment in N.m")
+    hold_force: Vector3 = number((0.0, 0.0, 0.0), ("N", "N", "N.m"), "constant thrust until the controller starts: x, y in e, yaw moment")
     added_mass: AddedMass = field(default_factory=AddedMass)
     damping: LinearDamping | None = field(default_factory=LinearDamping)
     drag: HullDrag | None = field(default_factory=HullDrag)

@@ -1,5 +1,6 @@
 """The vessel as a co-simulation unit: ports by name, snapshots as references. Knows nothing of FMI."""
 
+import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -8,7 +9,10 @@ from .attitude import Array, angles_from_quaternion
 from .parameters import VesselParameters
 from .vessel import WORKS, Inputs, State, Vessel
 
-Port = tuple[int, str, str]  # size, unit ("" for mixed units), description
+Port = tuple[int, str | tuple[str, ...], str]  # size, unit or those of the components, description
+_THRUST = ("N", "N", "N.m")
+_MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) + 3 * ("rad/(N.m.s)",))
+_AT_LEAST_ZERO = ("kinetic_energy", "restoring_energy", "damping_dissipation", "drag_dissipation")
 
 
 class VesselUnit:
@@ -20,9 +24,17 @@ class VesselUnit:
     INPUTS: ClassVar[dict[str, Port]] = {
         "force": (3, "N", "force of the pipe on the vessel at the hang-off point, in e, held over the step"),
         "moment": (3, "N.m", "moment of the pipe on the vessel at the hang-off point, in e, held over the step"),
-        "control_force": (3, "", "external controller: surge and sway force in b, N, and yaw moment, N.m"),
+        "force_change": (3, "N", "added to force: change of the pipe's pull, where force keeps its start value"),
+        "moment_change": (3, "N.m", "added to moment: change of the pipe's pull, where moment keeps its start value"),
+        "control_force": (3, _THRUST, "external controller: surge and sway force in b, and yaw moment"),
         "environment_force": (3, "N", "environmental force at the centre of gravity, in e"),
         "environment_moment": (3, "N.m", "environmental moment, in e"),
+    }
+    RANGES: ClassVar[dict[str, tuple[float | None, float | None]]] = {
+        **dict.fromkeys(_AT_LEAST_ZERO, (0.0, None)),
+        "roll": (-math.pi, math.pi),
+        "pitch": (-0.5 * math.pi, 0.5 * math.pi),
+        "yaw": (-math.pi, math.pi),
     }
 
     def __init__(self, parameters: VesselParameters) -> None:
@@ -40,7 +52,7 @@ class VesselUnit:
             "angular_velocity": (3, "rad/s", "rotation vector of the last step over its length, in e"),
             "end_velocity": (3, "m/s", "velocity of the hang-off point at the end of the step, in e"),
             "end_angular_velocity": (3, "rad/s", "angular velocity at the end of the step, in e"),
-            "mobility": (36, "", "row-major response of (velocity, angular_velocity) to (force, moment), last step"),
+            "mobility": (36, _MOBILITY, "row-major response of (velocity, angular_velocity) to (force, moment), last step"),
             "hang_off_position": (3, "m", "hang-off point, in e"),
             "hang_off_quaternion": (4, "1", "orientation of the pipe section held there, t to e, scalar first"),
             "position": (3, "m", "centre of gravity, in e"),
@@ -48,9 +60,9 @@ class VesselUnit:
             "roll": (1, "rad", "roll angle (zyx)"),
             "pitch": (1, "rad", "pitch angle (zyx)"),
             "yaw": (1, "rad", "yaw angle (zyx)"),
-            "body_velocity": (6, "", "linear, m/s, and angular velocity, rad/s, of the centre of gravity in b"),
-            "set_point": (3, "", "set-point after the reference filter: x, y, m; yaw, rad"),
-            "thrust": (3, "", "own thrust along the heading, hold included: surge, sway, N; yaw, N.m"),
+            "body_velocity": (6, 3 * ("m/s",) + 3 * ("rad/s",), "linear and angular velocity of the centre of gravity in b"),
+            "set_point": (3, ("m", "m", "rad"), "set-point after the reference filter: x, y, yaw"),
+            "thrust": (3, _THRUST, "own thrust along the heading, hold included: surge, sway, yaw"),
             "kinetic_energy": (1, "J", "kinetic energy of hull and added mass"),
             "restoring_energy": (1, "J", "potential of the hydrostatic restoring"),
             "bond_work": (1, "J", "work done on the vessel at the hang-off point since the start"),
@@ -61,6 +73,13 @@ class VesselUnit:
             "drag_dissipation": (1, "J", "energy taken by the quadratic drag since the start"),
         }
 
+    @staticmethod
+    def nominal(parameters: VesselParameters) -> dict[str, float]:
+        """Orders of magnitude by unit of measure: 1 m/s reached in 10 s, turns about the radius of gyration in yaw, the depth."""
+        mass, arm = parameters.mass, math.sqrt(parameters.inertia[2] / parameters.mass)
+        force = 0.1 * mass
+        return {"m": parameters.environment.depth, "m/s": 1.0, "rad": 0.1, "rad/s": 1.0 / arm, "N": force, "N.m": force * arm, "J": mass}
+
     def initialize(self, time: float, inputs: dict[str, Array]) -> str | None:
         """Take the pose, velocity and hold thrust of the parameters; never fails."""
         self.state = self.vessel.start()
@@ -68,7 +87,9 @@ class VesselUnit:
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
         """Step from `time`, s, by h, s; a message and the state unchanged if Newton did not converge."""
-        result = self.vessel.step(self._state, time, h, Inputs(**inputs))
+        pull = {name: inputs[name] + inputs[f"{name}_change"] for name in ("force", "moment")}
+        others = {name: inputs[name] for name in ("control_force", "environment_force", "environment_moment")}
+        result = self.vessel.step(self._state, time, h, Inputs(**pull, **others))
         if not result.converged:
             return f"vessel: Newton stopped at a relative unbalance of {result.residual:.1e} after {result.iterations} iterations"
         self.state = result.state

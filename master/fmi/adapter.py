@@ -2,7 +2,7 @@
 
 Travels inside every exported FMU (relative imports only) and drives any class of the unit protocol: PARAMETERS,
 INPUTS, outputs(), initialize(), step(), output(), state, and where there is one `remark`, what the log should say of a
-step that was done. Answers to the host (see `failure`):
+step that was done; RANGES of its ports and their nominal() values by unit of measure. Answers to the host (see `failure`):
   - a step that does not converge, meets a number that is not finite, or is asked for out of order: logged, discard,
     the unit stands where it stood before;
   - a refused parameter or initialisation, and a bug: fmi2Error with the message (fmi2Fatal under PythonFMU's own library), the process
@@ -28,16 +28,15 @@ from pythonfmu.default_experiment import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 
 from . import schema
-from .description import fill
+from .description import Variable, fill
 from .failure import Refused, guarded, printable, where
 from .ports import KINDS, Ports, Run
 
 CONFIGURATION = "configuration"
 START = "start."  # before the name of a parameter that has the name of a port, whose start value it is
 BROKEN_ARITHMETIC = (ArithmeticError, ValueError, np.linalg.LinAlgError)  # a failed step, not a bug
+LONGEST_TEXT = 10_000_000  # characters; a table of all nodes takes a fifth of it
 TIME_TOLERANCE = 1e-6  # of a step: hosts add up their time in ways of their own
-
-Reader = Callable[[], list[Any]]
 
 
 class Snapshot(NamedTuple):
@@ -77,19 +76,26 @@ class UnitSlave(Fmi2Slave):
         self._fields = {(START if name.partition("[")[0] in taken else "") + name: name for name in fields}
         flat = {name: fields[own] for name, own in self._fields.items()}
         flat[CONFIGURATION] = schema.Parameter("String", "", doc="All parameters as JSON; empty: the built-in ones")
-        self.ports = Ports(inputs, outputs, flat)
-        self.inputs = np.zeros(self.ports.n_inputs)
+        self.ports = Ports(inputs, outputs, flat, about["inputs"])
+        self.inputs = self.ports.start.copy()
         self._run_of_inputs = list(range(self.ports.n_inputs))
         self.changed: dict[str, Any] = {}  # parameters set by the host; replaced, never mutated
         self.phase, self.time = "not initialised", 0.0
         self.unit: Any = None
-        self._readers: dict[tuple[object, ...], list[Reader]] = {}
+        self._runs: dict[tuple[object, ...], list[Run]] = {}
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """PythonFMU's frame, completed."""
         root = super().to_xml(model_options or {})
-        fill(root, self.ports.variables())
+        root.set("generationTool", f"pipelay {self.version} with {root.get('generationTool')}")
+        fill(root, self.variables())
         return root
+
+    def variables(self) -> list[Variable]:
+        """Scalar variables in the order of their value references."""
+        unit = self.unit_class
+        nominal = unit.nominal(self.parameters) if hasattr(unit, "nominal") else {}
+        return self.ports.variables(getattr(unit, "RANGES", {}), nominal)
 
     # life cycle
 
@@ -172,10 +178,10 @@ class UnitSlave(Fmi2Slave):
 
     def _get(self, kind: str, vrs: list[int]) -> list[Any]:
         key = (kind, *vrs)
-        readers = self._readers.get(key)
-        if readers is None:  # hosts repeat themselves: the runs of a request are found once
-            readers = self._readers[key] = [self._reader(run) for run in self.ports.runs(vrs, kind)]
-        return readers[0]() if len(readers) == 1 else [value for read in readers for value in read()]
+        runs = self._runs.get(key)
+        if runs is None:  # hosts repeat themselves: the runs of a request are found once
+            runs = self._runs[key] = list(self.ports.runs(vrs, kind))
+        return self._read(runs[0]) if len(runs) == 1 else [value for run in runs for value in self._read(run)]
 
     def _set(self, kind: str, vrs: list[int], values: Sequence[Any]) -> None:
         """All of them or, where one is refused, none."""
@@ -192,24 +198,22 @@ class UnitSlave(Fmi2Slave):
                 raise Refused(f"{name} = {value}: a parameter cannot be set after initialisation")
             elif isinstance(value, float) and not math.isfinite(value):
                 raise Refused(f"{name} = {value}: must be finite")
+            elif isinstance(value, str) and len(value) > LONGEST_TEXT:
+                raise Refused(f"{name}: has {len(value)} characters, must have at most {LONGEST_TEXT}")
             else:
                 changed[name] = value
         self.inputs[:], self.changed = inputs, changed
         if self.phase != "initialised":
             self.unit = None
 
-    def _reader(self, run: Run) -> Reader:
-        name, part = run.name, run.part
-        if run.causality == "parameter":
-            return lambda: [self.changed.get(name, self.ports.parameters[name].value)]
-        if run.causality == "input":
-            return lambda: self.inputs[self.ports.input_slices[name]][part].tolist()
-
-        def read() -> list[float]:
+    def _read(self, run: Run) -> list[Any]:
+        causality, name, part = run
+        if causality == "output":
             unit = self.unit
             return (self._ready() if unit is None else unit).output(name)[part].tolist()
-
-        return read
+        if causality == "input":
+            return self.inputs[self.ports.input_slices[name]][part].tolist()
+        return [self.changed.get(name, self.ports.parameters[name].value)]
 
     # state
 

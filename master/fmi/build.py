@@ -19,7 +19,7 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -30,7 +30,7 @@ from pythonfmu import FmuBuilder
 
 from ..errors import RunError
 from . import licenses, loader, portable
-from .document import icon_png, port_table_html
+from .document import icon_png, page_html
 from .portable import EPOCH
 
 HERE = Path(__file__).parent
@@ -45,7 +45,8 @@ class Recipe:
 
     `package` is the folder of the unit package, `unit` the place of its class in it (``slave.PipeUnit``), `parameters`
     the nested mapping that becomes the defaults. Without a `description` the unit's own is taken. `experiment` may hold
-    start_time, stop_time, step_size, tolerance. A `portable` FMU brings its own Python and compiled kernels (see `portable`).
+    start_time, stop_time, step_size, tolerance; `inputs` the start values of inputs that do not start at zero. A `portable`
+    FMU brings its own Python and compiled kernels (see `portable`).
     """
 
     package: Path
@@ -55,6 +56,7 @@ class Recipe:
     author: str = "the pipelay authors"
     license: str = "MIT"
     experiment: Mapping[str, float] = field(default_factory=dict)
+    inputs: Mapping[str, Sequence[float]] = field(default_factory=dict)
     portable: bool = False
 
     @property
@@ -70,7 +72,7 @@ class Recipe:
     @property
     def digest(self) -> str:
         """Hash of everything the FMU's content follows from."""
-        facts = {**_about(self), "parameters": self.parameters, "experiment": dict(self.experiment)}
+        facts = {**_about(self), "parameters": self.parameters, "experiment": dict(self.experiment), "inputs": dict(self.inputs)}
         return _digest({"bundle": self.bundle, "facts": json.dumps(facts, sort_keys=True)})
 
 
@@ -85,7 +87,7 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
         entry, configuration = Path(folder, f"{recipe.bundle}_entry.py"), Path(folder, "fmu.json")
         shutil.copy(HERE / "entry.py", entry)
         about = {**_about(recipe), "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, recipe.digest))}
-        content = {"about": about, "parameters": recipe.parameters, "experiment": dict(recipe.experiment)}
+        content = {"about": about, "parameters": recipe.parameters, "experiment": dict(recipe.experiment), "inputs": dict(recipe.inputs)}
         configuration.write_text(json.dumps(content, indent=1), encoding="utf-8")
         bundle = Path(folder, recipe.bundle)
         for name, text in _sources(recipe).items():
@@ -180,7 +182,8 @@ def _finish(recipe: Recipe, raw: Path, finished: Path) -> None:
     with zipfile.ZipFile(raw) as source:
         contents = {name: source.read(name) for name in source.namelist()}
     model = ElementTree.fromstring(contents["modelDescription.xml"])
-    contents["documentation/index.html"] = port_table_html(model).encode()
+    about = recipe.package / "about.html"
+    contents["documentation/index.html"] = page_html(model, about.read_text(encoding="utf-8") if about.is_file() else "").encode()
     contents["model.png"] = icon_png()
     for name in (name for name in contents if name.startswith(LINUX)):  # Windows keeps PythonFMU's
         contents[name] = loader.library(cache_folder("loaders"))

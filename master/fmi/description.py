@@ -38,6 +38,7 @@ class Variable:
     start: float | int | bool | str | None = None
     minimum: float | None = None
     maximum: float | None = None
+    nominal: float | None = None
 
 
 def scalar_names(name: str, size: int) -> list[str]:
@@ -98,7 +99,8 @@ def _scalar_variable(variable: Variable, reference: int) -> Element:
     if variable.doc:
         about["description"] = variable.doc
     element = Element("ScalarVariable", about)
-    details = {"start": variable.start, "min": variable.minimum, "max": variable.maximum, "unit": variable.unit or None}
+    details = {"start": variable.start, "min": variable.minimum, "max": variable.maximum, "nominal": variable.nominal}
+    details["unit"] = variable.unit or None
     SubElement(element, variable.kind, {key: _text(value) for key, value in details.items() if value is not None})
     return element
 

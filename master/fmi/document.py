@@ -13,14 +13,15 @@ import numpy as np
 _ICON = 96  # pixels
 
 
-def port_table_html(model: Element) -> str:
-    """One page: what the model is, its input and output ports (vectors in one row), its parameters with defaults."""
+def page_html(model: Element, about: str) -> str:
+    """One page: what the model is, `about` it in HTML, its input and output ports (vectors in one row), its parameters with defaults."""
     title, text = model.get("modelName", ""), model.get("description", "")
     facts = " · ".join(f"{key} {model.get(key)}" for key in ("version", "author", "license") if model.get(key))
     parts = [
         f"<!DOCTYPE html><html><head><meta charset='utf-8'><title>{html.escape(title)}</title>",
         "<style>body{font-family:sans-serif;max-width:60em}td,th{text-align:left;padding:.1em 1em .1em 0}</style>",
         f"</head><body><h1>{html.escape(title)}</h1><p>{html.escape(text)}</p><p>{html.escape(facts)}</p>",
+        about,
     ]
     for causality, heading in (("input", "Inputs"), ("output", "Outputs"), ("parameter", "Parameters")):
         cells = [_row(*row) for row in _ports(model, causality)]
@@ -55,16 +56,22 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 def _ports(model: Element, causality: str) -> list[list[str]]:
     """Rows (name, size, unit, default, meaning) of all variables of one causality; ``x[1]``.. share a row."""
     rows: dict[str, list[str]] = {}
+    units: dict[str, dict[str, None]] = {}  # of a port's components, each once
     for variable in model.iterfind("ModelVariables/ScalarVariable"):
         if variable.get("causality") != causality:
             continue
         name = re.sub(r"\[\d+\]$", "", variable.get("name", ""))
-        value = variable[0].get("start", "") if causality == "parameter" else ""
+        value = variable[0].get("start", "")
+        units.setdefault(name, {})[variable[0].get("unit", "")] = None
         if name in rows:
             rows[name][1] = str(int(rows[name][1]) + 1)
             rows[name][3] += f", {value}" if value else ""
         else:
-            rows[name] = [name, "1", variable[0].get("unit", ""), value, variable.get("description", "")]
+            rows[name] = [name, "1", "", value, variable.get("description", "")]
+    for name, row in rows.items():
+        row[2] = ", ".join(units[name])
+        if causality == "input" and not any(map(float, row[3].split(", "))):
+            row[3] = ""  # zero goes without saying
     return list(rows.values())
 
 

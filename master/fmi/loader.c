@@ -170,6 +170,7 @@ static int ask_host(Buffer *request, Buffer *reply) {
 static int ask(Instance *it, const char **result, size_t expected) {
     uint32_t head[2] = {ERROR, 0};
     Buffer *reply = &it->reply;
+    if (it->request.size > UINT32_MAX) return complain(it, "%zu bytes in one call are too many", it->request.size);
     if (!(py.handle ? ask_host : ask_process)(&it->request, reply) || reply->size < sizeof head)
         return complain(it, "the FMU's Python has ended");
     memcpy(head, reply->data, sizeof head);

@@ -13,7 +13,8 @@ from .description import Variable, scalar_names
 from .schema import Parameter
 
 KINDS = ("Real", "Integer", "Boolean", "String")  # of FMI variables; ports are real
-PortTable = Mapping[str, tuple[int, str, str]]  # name -> (size, unit, description)
+PortTable = Mapping[str, tuple[int, str | Sequence[str], str]]  # name -> (size, unit or those of the components, description)
+Ranges = Mapping[str, tuple[float | None, float | None]]  # port -> least and largest value
 
 
 class Run(NamedTuple):
@@ -27,7 +28,9 @@ class Run(NamedTuple):
 class Ports:
     """The variables of one unit with one set of parameters."""
 
-    def __init__(self, inputs: PortTable, outputs: PortTable, parameters: Mapping[str, Parameter]) -> None:
+    def __init__(
+        self, inputs: PortTable, outputs: PortTable, parameters: Mapping[str, Parameter], start: Mapping[str, Sequence[float]] | None = None
+    ) -> None:
         self.inputs, self.outputs, self.parameters = dict(inputs), dict(outputs), dict(parameters)
         taken = inputs.keys() | outputs.keys()
         if twice := (inputs.keys() & outputs.keys()) | {name for name in parameters if name.partition("[")[0] in taken}:
@@ -41,6 +44,16 @@ class Ports:
         for name, port in inputs.items():
             self.input_slices[name] = slice(first, first + port[0])
             first += port[0]
+        self.start = self._start(start or {})
+
+    def _start(self, given: Mapping[str, Sequence[float]]) -> NDArray[np.float64]:
+        """Start values (n_inputs,) of the inputs: those given by name, else zero. Raises ValueError for a name or size that is wrong."""
+        values = np.zeros(self.n_inputs)
+        for name, value in given.items():
+            if name not in self.inputs or len(value) != self.inputs[name][0]:
+                raise ValueError(f"{name} = {list(value)}: must be an input of that many values; there are {', '.join(self.inputs)}")
+            values[self.input_slices[name]] = value
+        return values
 
     def place(self, reference: int, kind: str = "Real") -> tuple[str, str, int]:
         """(causality, name, index in the port) of a value reference. Raises ValueError if there is none of that kind."""
@@ -76,15 +89,17 @@ class Ports:
         _, name, i = self.place(bad)
         return f"{name}[{i + 1}] = {inputs[bad]}: must be finite"
 
-    def variables(self) -> list[Variable]:
-        """Scalar variables for the model description, in the order of their value references."""
-        groups = [("input", self.inputs, 0.0), ("output", self.outputs, None)]
-        table = [
-            Variable(scalar, causality, "Real", unit, doc, start)
-            for causality, group, start in groups
-            for name, (size, unit, doc) in group.items()
-            for scalar in scalar_names(name, size)
-        ]
-        return table + [
-            Variable(name, "parameter", it.kind, it.unit, it.doc, it.value, it.minimum, it.maximum) for name, it in self.parameters.items()
-        ]
+    def variables(self, ranges: Ranges, nominal: Mapping[str, float]) -> list[Variable]:
+        """Scalar variables for the model description, in the order of their value references; `nominal` values by unit of measure."""
+        ports, table = self.inputs | self.outputs, []
+        for reference, (causality, name, i) in enumerate(self._places):
+            if causality == "parameter":
+                it = self.parameters[name]
+                table.append(Variable(name, causality, it.kind, it.unit, it.doc, it.value, it.minimum, it.maximum))
+                continue
+            size, units, doc = ports[name]
+            unit = units if isinstance(units, str) else units[i]
+            start = float(self.start[reference]) if causality == "input" else None
+            bounds = ranges.get(name, (None, None))
+            table.append(Variable(scalar_names(name, size)[i], causality, "Real", unit, doc, start, *bounds, nominal.get(unit)))
+        return table

@@ -2,8 +2,9 @@
 
 Part of every exported FMU, so this module imports the standard library only. Field types understood: float, int,
 bool, str, Literal, fixed tuples of numbers, tuple[X, ...], a nested dataclass, and ``X | None`` of any of them
-(None = absent). Field metadata: ``unit``, ``doc``, ``min``/``max`` and the strict ``above``/``below``; ranges are the
-dataclass's own business (``__post_init__`` raises ``ValueError("key = value: rule")``), here the path is put before it.
+(None = absent). Field metadata: ``unit`` (or one each for a fixed tuple), ``doc``, ``min``/``max`` and the strict
+``above``/``below``; ranges are the dataclass's own business (``__post_init__`` raises ``ValueError("key = value: rule")``), here
+the path is put before it.
 """
 
 from __future__ import annotations
@@ -153,18 +154,19 @@ def _flatten(tree: Any, path: str, flat: dict[str, Parameter]) -> None:
                 text = json.dumps(_plain(value), separators=(",", ":"))
                 flat[name] = Parameter("String", text, doc=f"{about.get('doc', '')} (JSON)".strip())
             else:
-                flat.update({f"{name}[{i}]": _parameter(item, about) for i, item in enumerate(value, 1)})
+                flat.update({f"{name}[{i + 1}]": _parameter(item, about, i) for i, item in enumerate(value)})
         else:
             flat[name] = _parameter(value, about)
 
 
-def _parameter(value: Any, about: Mapping[str, Any]) -> Parameter:
+def _parameter(value: Any, about: Mapping[str, Any], place: int = 0) -> Parameter:
     kind = _KINDS[type(value)]
     if kind not in ("Real", "Integer"):
         return Parameter(kind, value, doc=about.get("doc", ""))
     # FMI has no strict bounds: the closed interval is stated, the unit itself refuses the end point
     lowest, highest = about.get("min", about.get("above")), about.get("max", about.get("below"))
-    unit = about.get("unit", "") if kind == "Real" else ""  # FMI gives units to reals only
+    units = about.get("unit", "") if kind == "Real" else ""  # FMI gives units to reals only
+    unit = units if isinstance(units, str) else units[place]
     return Parameter(kind, value, unit, lowest, highest, about.get("doc", ""))
 
 

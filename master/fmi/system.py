@@ -4,6 +4,10 @@ Hosts without rollback exchange values once a step. What suits them is the vesse
 the pipe over the next one, and the pipe's mean pull, held by the vessel: of first order in the step, and stable for vessels well
 above the mass that moves with the pipe's end (in the paper's scene at 0.05 s at 640 t, not at 190 t). A master that iterates
 connects the vessel's mean velocity instead (`master.bond`).
+
+The SSP connects the change of the pull from a reference, the pull at rest, which the vessel's unconnected `force` and `moment` have
+for their start values: a host that puts zeros into connected inputs at its start, as FMPy does, then starts right. The OSP's hosts
+exchange values before they step, and their power bonds need the whole pull.
 """
 
 from __future__ import annotations
@@ -44,6 +48,11 @@ WIRES = (
 )
 SEEN = {"pipe": ("top_position[1]", "top_position[2]", "top_position[3]", "top_work"),  # outputs beside the connections
         "vessel": ("hang_off_position[1]", "hang_off_position[2]", "hang_off_position[3]", "bond_work")}  # fmt: skip
+CHANGES = (
+    *WIRES[:2],
+    Wire("pipe", "force_change", "vessel", "force_change"),
+    Wire("pipe", "moment_change", "vessel", "moment_change"),
+)
 PORTS = {  # unit -> (port element of the OSP, name, its effort and flow: element, FMI name, unit)
     "pipe": (
         ("LinearMechanicalPort", "hang-off", ("Force", "force", "N"), ("LinearVelocity", "velocity", "m/s")),
@@ -76,7 +85,7 @@ def write_system(fmus: Mapping[str, Path], folder: Path, macro_step: float, dura
 
 
 def structure_description(duration: float) -> Element:
-    """SystemStructure.ssd: both FMUs and plain connections; parameters keep the FMUs' defaults."""
+    """SystemStructure.ssd: both FMUs and plain connections; parameters and all other inputs keep the FMUs' start values."""
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     about = {"version": "1.0", "name": "pipelay", "generationTool": "pipelay", "generationDateAndTime": now}
     root = Element("ssd:SystemStructureDescription", {"xmlns:ssd": SSD, "xmlns:ssc": SSC, **about})
@@ -85,14 +94,14 @@ def structure_description(duration: float) -> Element:
     for name in PORTS:
         about = {"name": name, "source": f"resources/{name}.fmu", "type": "application/x-fmu-sharedlibrary"}
         connectors = SubElement(SubElement(elements, "ssd:Component", about), "ssd:Connectors")
-        for wire in WIRES:
+        for wire in CHANGES:
             for kind, unit, port in (("output", wire.source, wire.output), ("input", wire.target, wire.input)):
                 for scalar in scalar_names(port, 3) if unit == name else ():
                     SubElement(SubElement(connectors, "ssd:Connector", name=scalar, kind=kind), "ssc:Real")
         for scalar in SEEN[name]:
             SubElement(SubElement(connectors, "ssd:Connector", name=scalar, kind="output"), "ssc:Real")
     connections = SubElement(system, "ssd:Connections")
-    for wire in WIRES:
+    for wire in CHANGES:
         for start, end in _scalars(wire):
             ends = {"startElement": wire.source, "startConnector": start, "endElement": wire.target, "endConnector": end}
             SubElement(connections, "ssd:Connection", ends)
