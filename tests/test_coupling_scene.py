@@ -1,8 +1,13 @@
 """A scene of any two FMUs from the command line: what it computes, what it refuses, and what an FMU that dies leaves behind."""
 
 import json
+import os
+import pty
+import signal
 import subprocess
 import sys
+from contextlib import suppress
+from time import sleep
 
 import numpy as np
 import pytest
@@ -171,15 +176,82 @@ def test_an_fmu_that_fails_for_good_ends_the_run_with_its_results_so_far(folder,
     assert ("not finite" if kind == "nan" else "planted") in capsys.readouterr().out
 
 
-def test_an_fmu_that_crashes_leaves_its_results_so_far_and_a_summary_that_says_so(folder, tmp_path):
-    call = [sys.executable, "-m", "master", "run", str(folder / "tied.toml"), "--set", failing("crash"), "-o", str(tmp_path)]
-    done = subprocess.run(call, check=False, capture_output=True, text=True)
-    assert done.returncode not in (0, 1, 2)  # the signal's
-    assert "in step" in done.stderr  # where
-    np.testing.assert_allclose(columns(tmp_path)["time"], 0.1 * np.arange(21), atol=1e-12)
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["status"] == "died"
-    assert "signals.csv" in summary["message"]
+def command(folder, out, kind):
+    return [sys.executable, "-m", "master", "run", str(folder / "tied.toml"), "--set", failing(kind), "-o", str(out)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "how"),
+    [("crash", "was ended by SIGSEGV"), ("abort", "was ended by SIGABRT"), ("exit", "was ended from within, with exit code 0")],
+)
+def test_an_fmu_that_takes_its_process_with_it_ends_in_one_line_and_the_results_so_far(folder, tmp_path, kind, how):
+    out = tmp_path / "out"
+    done = subprocess.run(command(folder, out, kind), check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == f"pipelay: the process {how} at t = 2 s; results so far in {out}\n"
+    found, summary = columns(out), json.loads((out / "summary.json").read_text())
+    np.testing.assert_allclose(found["time"], 0.1 * np.arange(21), atol=1e-12)
+    assert (summary["status"], summary["duration_s"]) == ("died", pytest.approx(2.0))
+    assert summary["message"] == f"the process {how} at t = 2 s"
+    assert summary["exchanged_energy_J"] == found["exchanged"][-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert sorted(path.name for path in out.iterdir()) == ["energy.png", "signals.csv", "summary.json"]
+
+
+def test_the_results_of_an_earlier_run_are_not_taken_for_those_of_one_that_dies_before_its_own(folder, tmp_path):
+    out = tmp_path / "out"
+    ran(folder, out)
+    before = (out / "summary.json").read_text()
+    died = "import os, sys, master.bonded; master.bonded.Bonded.__init__ = lambda *_: os._exit(3)"
+    call = f"{died}; sys.argv[1:] = {command(folder, out, 'crash')[3:]!r}; from master.__main__ import program; sys.exit(program())"
+    done = subprocess.run([sys.executable, "-c", call], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (1, "pipelay: the process was ended from within, with exit code 3\n")
+    assert (out / "summary.json").read_text() == before
+
+
+def until_slow(out):
+    """Until a run has taken some of its slow steps."""
+    while not (out / "signals.csv").exists() or (out / "signals.csv").read_bytes().count(b"\n") < 23:
+        sleep(0.02)
+
+
+def begun(folder, out):
+    """A run that has taken some of its slow steps."""
+    child = subprocess.Popen(command(folder, out, "wait"), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    until_slow(out)
+    return child
+
+
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_the_command_is_passed_on_and_ends_the_run_at_the_next_step(folder, tmp_path, which):
+    child = begun(folder, tmp_path)
+    child.send_signal(which)
+    printed, complaint = child.communicate()
+    assert (child.returncode, complaint) == (1, "")
+    assert "interrupted at" in printed
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "interrupted"
+
+
+def test_ctrl_c_at_a_terminal_reaches_both_processes_and_ends_the_run_once(folder, tmp_path):
+    process, terminal = pty.fork()
+    if process == 0:
+        os.execv(sys.executable, command(folder, tmp_path, "wait"))
+    until_slow(tmp_path)
+    os.write(terminal, b"\x03")
+    printed = b""
+    with suppress(OSError):  # how a terminal ends
+        while True:
+            printed += os.read(terminal, 4096)
+    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 1
+    assert b"interrupted at" in printed
+    assert b"Traceback" not in printed
+
+
+def test_the_run_ends_with_a_command_that_is_killed(folder, tmp_path):
+    child = begun(folder, tmp_path)
+    child.kill()
+    child.communicate()  # until nobody holds the streams, its worker neither
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "interrupted"
 
 
 def test_what_a_unit_says_of_its_steps_is_in_the_report(folder, tmp_path, capsys):
