@@ -8,12 +8,16 @@ import subprocess
 import sys
 from contextlib import suppress
 from time import sleep
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 from units.toys import build_pair
 
 from master.__main__ import main
+from master.fmi.build import Recipe, build_fmu
+from master.stability.coupled import UNITS
+from master.stability.published import LIM
 
 SCENE = """
 title = "A spring and a body"
@@ -51,12 +55,28 @@ def folder(tmp_path_factory):
         patch.setenv("PIPELAY_CACHE", str(tmp_path_factory.mktemp("cache")))
         place = tmp_path_factory.mktemp("scene")
         build_pair(place, failure={"above": 1e9})
+        rewritten(place / "spring.fmu", place / "fixed.fmu", {'StepSize="true"': 'StepSize="false"'})
+        kilonewton = {'"N"': '"kN"', '<BaseUnit kg="1" m="1" s="-2"': '<BaseUnit factor="1000" kg="1" m="1" s="-2"'}
+        rewritten(place / "spring.fmu", place / "kilo.fmu", kilonewton)
+        for unit in ("Spring", "Mass"):
+            build_fmu(Recipe(UNITS / "linear_fmu", f"slave.{unit}Unit", {}), place / f"linear_{unit}.fmu".lower())
         energy = silent = SCENE
         for mark, line in ENERGY.items():
             energy, silent = energy.replace(mark, line), silent.replace(mark, "")
         (place / "tied.toml").write_text(energy)
         (place / "silent.toml").write_text(silent)
         yield place
+
+
+def rewritten(fmu, target, changes):
+    """A copy of an FMU with another model description."""
+    with ZipFile(fmu) as source, ZipFile(target, "w") as copy:
+        for name in source.namelist():
+            content = source.read(name)
+            for old, new in changes.items() if name == "modelDescription.xml" else ():
+                assert old.encode() in content
+                content = content.replace(old.encode(), new.encode())
+            copy.writestr(name, content)
 
 
 def ran(folder, out, *changes, scene="tied"):
@@ -92,6 +112,49 @@ def test_it_runs_like_any_other_and_its_ledger_closes(folder, tmp_path, capsys):
     assert "energy check" in capsys.readouterr().out
 
 
+def test_one_pair_of_vectors_serves_as_well_as_two(folder, tmp_path):
+    one = 'bond.pairs=[{effort="force", flow="velocity", floor=1e-6}]'
+    for name, change in (("two", "title='two'"), ("one", one)):
+        assert ran(folder, tmp_path / name, change)[0] == 0
+    both = [columns(tmp_path / name) for name in ("one", "two")]
+    for name in ("mass.position[1]", "mass.position[2]", "coil.stretch[1]"):
+        np.testing.assert_allclose(both[0][name], both[1][name], atol=1e-9)
+
+
+def test_a_pair_of_scalars_couples_the_published_oscillator(folder, tmp_path):
+    """The LIM oscillator from a scene file, against the matrix exponential."""
+    energy = 'energy = {stored = ["kinetic_energy", "elastic_energy"], dissipated = ["damping_dissipation"], bond = "bond_work"}'
+    halves = (("spring", LIM.first), ("mass", LIM.second))
+    lines = ["[simulation]", "duration = 1.0", "macro_step = 1e-3", "[bond]", "impedance = 'spring'", "mobility = 'mass'"]
+    lines.append("pairs = [{effort = 'force', flow = 'velocity', floor = 1e-6}]")
+    for name, parameters in halves:
+        values = ", ".join(f"{key} = {value}" for key, value in parameters.items())
+        lines += [f"[units.{name}]", f"fmu = 'linear_{name}.fmu'", f"parameters = {{{values}}}", "outputs = ['position']", energy]
+    (folder / "lim.toml").write_text("\n".join(lines))
+    code, summary = ran(folder, tmp_path, scene="lim")
+    found = columns(tmp_path)
+    assert code == 0
+    assert summary["ledger_closure_J"] <= 1e-9 * summary["exchanged_energy_J"]
+    exact = LIM.exact(found["time"])
+    np.testing.assert_allclose(found["spring.position"], exact[:, 0], atol=5e-3)  # of 20 m
+    np.testing.assert_allclose(found["mass.position"], exact[:, 1], atol=5e-3)
+
+
+FIXED = "units.coil.fmu='fixed.fmu'"
+
+
+def test_no_other_step_is_asked_of_a_unit_that_cannot_vary_it(folder, tmp_path, capsys):
+    code, summary = ran(folder, tmp_path, FIXED)
+    assert (code, summary["macro_steps"]) == (0, 50)
+    assert "no step is halved, for coil cannot vary it" in capsys.readouterr().out
+    code, summary = ran(folder, tmp_path, FIXED, failing("message"))
+    assert (code, summary["rejected_steps"]) == (1, 1)
+    assert "with a step of 0.1 s: coil: step of 0.1 s at 2 s: planted" in summary["message"]
+    assert summary["message"].endswith("an FMU takes no other step")
+    code, summary = ran(folder, tmp_path, FIXED, "coupling.rollback=false", "coupling.energy_check=2.0")
+    assert (code, summary["macro_steps"]) == (0, 50)
+
+
 def test_without_reported_energies_the_check_is_the_residual_alone_and_says_so(folder, tmp_path, capsys):
     code, summary = ran(folder, tmp_path, scene="silent")
     assert code == 0
@@ -124,6 +187,24 @@ def test_the_check_measures_the_same_for_every_scheme(folder, tmp_path):
 
 
 MISTAKES = {
+    "a last step that is shorter": (
+        f"{FIXED}\nsimulation.duration=5.03",
+        "simulation.duration = 5.03: must be a multiple of macro_step = 0.1 s, which unit coil cannot vary",
+    ),
+    "a step to be refined": (
+        f"{FIXED}\ncoupling.on_violation='refine'",
+        "coupling.on_violation = 'refine': must be stop or warn, for unit coil cannot vary its step",
+    ),
+    "kilonewtons": ("units.coil.fmu='kilo.fmu'", "bond.pairs[1]: force is in kN and force in N; must be the same"),
+    "no power": (
+        'bond.pairs=[{effort="moment", flow="velocity", effort_input="moment", flow_input="velocity", floor=1}]',
+        "bond.pairs[1]: moment [N.m] times velocity [m/s] must be a power in W",
+    ),
+    "no energy": (
+        "units.coil.energy={stored=['stretch'], bond='force'}",
+        "units.coil.energy.bond = 'force': is in N, must be in J",
+    ),
+    "misspelt key": ("bond.pairs=[{efort='force', flow='velocity', floor=1}]", "bond.pairs[1].efort = 'force': unknown key"),
     "no such file": ('units.coil.fmu="none.fmu"', "units.coil.fmu = 'none.fmu': no such file"),
     "no FMU": ('units.coil.fmu="tied.toml"', "units.coil.fmu = 'tied.toml': "),
     "unknown unit": ('bond.impedance="cable"', "bond.impedance = 'cable': must be one of coil, mass"),
@@ -153,7 +234,8 @@ MISTAKES = {
 
 @pytest.mark.parametrize(("change", "message"), MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_is_one_line_and_exit_code_2(folder, tmp_path, capsys, change, message):
-    assert main(["run", str(folder / "tied.toml"), "--set", change, "-o", str(tmp_path / "out")]) == 2
+    changes = [f"--set={line}" for line in change.split("\n")]
+    assert main(["run", str(folder / "tied.toml"), *changes, "-o", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"pipelay: {message}")
     assert error.count("\n") == 1
