@@ -5,6 +5,7 @@ import pytest
 from units.toys import BODY_COLUMNS, SPRING_COLUMNS, build_pair, tied
 
 from master.bond import FmuEnd
+from master.coupling import Step
 from master.fmu import Fmu, FmuFailed
 from master.ledger import Columns, EnergyCheckFailed, Ledger
 
@@ -86,6 +87,16 @@ def test_refine_halves_a_step_whose_residual_the_coupling_let_pass(files):
     assert runs["warn"][0] > 1e-6
     assert runs["refine"][0] <= 1e-6
     assert runs["refine"][1] > 0
+
+
+def test_residuals_that_cancel_do_not_hide_each_other():
+    def step(moved, residual):
+        return Step(0.0, 1.0, np.array([moved]), np.array([1.0]), residual, 1)
+
+    ledger = Ledger([], tolerance=1e-3)
+    assert all(ledger.check(step(*done)) for done in ((10.0, 0.0), (0.1, 4e-3), (0.1, -4e-3)))
+    with pytest.raises(EnergyCheckFailed, match=r"closure error 0\.004 J .* the bond made 0\.004 J in this step, 0\.012 J in all"):
+        ledger.check(step(0.1, 4e-3))
 
 
 def test_refine_gives_up_on_what_no_step_can_cure(files):

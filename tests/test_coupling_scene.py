@@ -186,6 +186,18 @@ def test_the_check_measures_the_same_for_every_scheme(folder, tmp_path):
     assert left["energy-consistent"] < 1e-9 < 1e-2 < left["serial"] < left["parallel"]
 
 
+def test_what_the_coupling_lets_pass_is_warned_of_refined_or_stops_the_run_as_the_scene_says(folder, tmp_path):
+    sloppy = "units.coil.parameters={stiffness=4.0, hardening=30.0}", "coupling.tolerance=1e-3", "coupling.energy_check=1e-6"
+    runs = {action: ran(folder, tmp_path / action, *sloppy, f"coupling.on_violation='{action}'") for action in ("warn", "refine", "stop")}
+    ends = {action: (code, summary["status"], summary["energy_check_passed"]) for action, (code, summary) in runs.items()}
+    assert ends == {"warn": (1, "completed", False), "refine": (0, "completed", True), "stop": (1, "stopped", False)}
+    summary = runs["refine"][1]
+    assert summary["rejected_steps"] > 0
+    assert max(summary["ledger_closure_J"], summary["interface_residual_J"]) <= 1e-6 * summary["exchanged_energy_J"]
+    assert runs["warn"][1]["ledger_closure_J"] > 1e-6 * runs["warn"][1]["exchanged_energy_J"]
+    assert runs["stop"][1]["duration_s"] < 5.0
+
+
 MISTAKES = {
     "a last step that is shorter": (
         f"{FIXED}\nsimulation.duration=5.03",
