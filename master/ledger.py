@@ -98,8 +98,9 @@ class _Account:
 class Ledger:
     """Opens with the FMUs initialised and at rest between two steps; call `check` after every step.
 
-    `tolerance` is what is allowed of the closure error, and of the interface residuals' amounts together, relative to the energy exchanged so far: the sum of |dB| of the first FMU
-    (of a single FMU without a bond: of the largest change of any column); to it comes ROUND_OFF of the largest column.
+    `tolerance` is what is allowed of the closure error, and of the interface residuals' amounts together, relative to the energy
+    exchanged so far: the sum of |dB| of the first FMU (of a single FMU without a bond: of the largest change of any column); to it
+    comes ROUND_OFF of the largest column.
     `action` on a violation: "stop" raises EnergyCheckFailed, "refine" sends the step back to be halved and stops when
     that does not help, "warn" keeps the first complaint and goes on. Without sources, where no FMU reports energies, the
     check is the bond's residual alone, summed with its sign; `idle` is then the power [W] that counts as nothing.
