@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from units.toys import build_pair, tied
 
-from master.bond import Bond, impedance_end, mobility_end
+from master.bond import Bond, Pair, impedance_end, mobility_end
 from master.coupling import CouplingFailed, coupling
 from master.extrapolation import Extrapolation
 from master.fmu import STEP_FAILURES
 from master.hang_off import hang_off
+from master.one_solve import History
 
 PUSH = {"start_velocity": [1.0, 0.5, 0.0], "start_rotation": [0.0, 0.2, -0.1]}
 
@@ -189,6 +190,42 @@ def test_all_saved_states_are_freed(files):
         assert pair.spring._states == pair.body._states == set()
 
 
+class Law:
+    """An end that answers by a function of what it holds, from rest, and offers this slope."""
+
+    rollback, yields, varies = True, False, True
+
+    def __init__(self, answer, slope):
+        self.answer, self.slope, self.solves = answer, slope, 0
+
+    def solve(self, time, step, held):
+        self.solves += 1
+        return self.answer(held)
+
+    def result(self):
+        return np.zeros(2)
+
+    def derivative(self):
+        return self.slope
+
+    def begin(self):
+        pass
+
+    commit = cancel = begin
+
+    def meet(self, time, step, free, mobility):
+        pass
+
+
+def test_an_effort_that_does_no_work_is_agreed_on_all_the_same():
+    """A gyroscope's is square to the flow: any gap in it has no residual, least of all with a slope that denies it."""
+    turn, push = np.array([[0.0, -3.0], [3.0, 0.0]]), np.array([1.0, 0.5])
+    spinning, body = Law(lambda flow: turn @ flow, np.zeros((2, 2))), Law(lambda effort: push + 0.7 * effort, 0.7 * np.eye(2))
+    done = coupling("energy-consistent", spinning, body, Bond((Pair("f", "v", 1e-9, 2),)), 0.1, 1e-10).advance(0.0, 0.1)
+    np.testing.assert_allclose(done.flow, np.linalg.solve(np.eye(2) - 0.7 * turn, push), rtol=1e-4)
+    assert done.residual == pytest.approx(0.0, abs=1e-12)
+
+
 def test_unknown_scheme_is_refused():
     with pytest.raises(ValueError, match="scheme = 'magic': must be one of energy-consistent, serial, parallel"):
         coupling("magic", None, None, hang_off(), 0.1)
@@ -218,6 +255,16 @@ def test_one_solve_each_without_rollback_does_not_grow_at_any_mass_ratio(files, 
         assert max(energies[150:]) < 1.5 * max(energies[:150])
         assert max(energies) < 1e3
         np.testing.assert_allclose(pair.spring.get("stretch"), pair.body.get("position"), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("share", "believed"), [(0.5, 0.5), (1.9, 1.9), (5.0, 2.0), (-1.0, 0.0)])
+def test_no_more_is_foreseen_of_an_end_than_a_passive_one_can_do(share, believed):
+    """s_n = s_(n-1) - a Z V has 0 <= a <= 2 where the end makes no energy."""
+    history, contribution, flow, weight = History(np.zeros(1), np.ones(1)), np.zeros(1), np.ones(1), 3.0 * np.eye(1)
+    for _ in range(20):
+        history.add(contribution, flow, weight)
+        contribution = contribution - share * 3.0
+    np.testing.assert_allclose(history.foreseen() - (contribution + share * 3.0), -believed * 3.0, rtol=1e-9, atol=1e-9)
 
 
 def test_one_solve_each_leaves_a_residual_that_is_measured_and_falls_with_the_step(files):
