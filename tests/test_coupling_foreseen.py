@@ -100,6 +100,18 @@ def test_the_measured_slope_is_symmetric_and_not_negative_whatever_the_end_does(
     np.testing.assert_allclose(foreseen.derivative(), 0.1 / 2 * np.array(passive), atol=1e-4)
 
 
+@pytest.mark.parametrize("rollback", [True, False])
+def test_what_the_other_end_did_not_follow_it_is_told_to_make_up_for(rollback):
+    ends = [Body(np.eye(2)) for _ in range(2)]
+    expected = []
+    for end, missed in zip(ends, (0.0, 0.25), strict=True):
+        end.rollback = rollback
+        foreseen, held = Foreseen(end, Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
+        foreseen.take(0.0, 0.1, held, end.velocity + 0.05 * held - missed)  # the end answers `missed` more than was foretold
+        expected.append(foreseen.solve(0.1, 0.2, held))
+    np.testing.assert_allclose(expected[1] - expected[0], 0.25 * 0.1 / 0.2, rtol=1e-12)
+
+
 def test_a_step_that_one_end_refuses_is_halved_while_the_other_stands_still_and_is_final_once_it_has_moved(files):
     refused = {"failure.above": 0.03, "failure.start": 1.0, "failure.end": 1.5}
     with tied(files, refused, PUSH, 0.1, rollback=ONE_SIDED, action="warn") as pair:

@@ -115,6 +115,18 @@ def test_the_message_names_the_fmu_that_does_not_balance_itself(files):
     assert abs(float(text.split("body's own balance is off by ")[1].split()[0])) > 1e-4
 
 
+def test_energy_that_vanishes_fails_as_well_as_energy_that_appears(files):
+    silent = Columns(BODY_COLUMNS.energy, BODY_COLUMNS.work, (), BODY_COLUMNS.bond)  # without what its damper takes
+    with tied(files, {}, {"damping": 0.5, **PUSH}, 0.1) as pair:
+        sources = [(pair.spring, SPRING_COLUMNS), (pair.body, silent)]
+        strict, patient = Ledger(sources), Ledger(sources, action="warn")
+        pair.coupling.check = patient.check
+        pair.run(0.1, 1.0)
+        assert patient.largest_closure == pytest.approx(pair.body.get("damping_dissipation")[0], rel=1e-9)
+        with pytest.raises(EnergyCheckFailed, match="closure error -"):
+            strict.record(1.0)
+
+
 def test_one_fmu_alone_is_balanced_with_its_bond_as_work_from_outside(files):
     with Fmu(files[0], "spring") as spring:
         spring.initialize({"damping": 0.1})
