@@ -1,4 +1,4 @@
-"""The command line: `pipelay`, or `python -m master`."""
+"""The command line: `pipelay`, or `python -m master`. Imports what a command needs only once it runs, see `master.guarded`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from master import commands
 from master.errors import RunError, UsageError
+from master.guarded import guarded
 from master.interrupts import breakable
 
 EPILOG = """examples:
@@ -32,14 +32,13 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser("pipelay", description=about, epilog=EPILOG, formatter_class=raw)
     subparsers = top.add_subparsers(metavar="COMMAND", required=True)
 
-    def command(name: str, function: commands.Command, short: str, epilog: str) -> argparse.ArgumentParser:
+    def command(name: str, short: str, epilog: str) -> argparse.ArgumentParser:
         added = subparsers.add_parser(name, help=short, description=short, epilog=epilog, formatter_class=raw)
-        added.set_defaults(command=function)
+        added.set_defaults(command=name.replace("-", "_"))  # a function of `master.commands`
         return added
 
     run = command(
         "run",
-        commands.run,
         "Simulate a scene; write signals, shapes, figures and a summary.",
         "files written: signals.csv, shapes.npz, fig3_*.png to fig9_*.png, energy.png, summary.json\n\n"
         "Ctrl-C ends a run early and keeps what was computed.",
@@ -49,7 +48,6 @@ def parser() -> argparse.ArgumentParser:
 
     statics = command(
         "statics",
-        commands.statics,
         "Find the static equilibrium of a scene and print its forces.",
         "Forces and moments act on the pipe; components are x forward, y starboard, z down.",
     )
@@ -58,7 +56,6 @@ def parser() -> argparse.ArgumentParser:
 
     export = command(
         "export",
-        commands.export,
         "Write the units of a scene as FMUs (FMI 2.0 co-simulation).",
         "The equilibrium of the scene is built in as the start of both FMUs.",
     )
@@ -69,11 +66,10 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--portable", action="store_true", help=portable)
 
     command(
-        "scenes", commands.scenes, "List the built-in scenes.", "Their files are in the package's folder master/scenes."
+        "scenes", "List the built-in scenes.", "Their files are in the package's folder master/scenes."
     )
     stability = command(
         "stability",
-        commands.stability,
         "Run the coupling's stability cases; write their tables and a stability map.",
         "files written: published.csv, limits.csv, stability_map.csv, stability_map.png, bodies.csv; all of it takes about ten minutes",
     )
@@ -81,14 +77,12 @@ def parser() -> argparse.ArgumentParser:
 
     hard = command(
         "hard-cases",
-        commands.hard_cases,
         "Run the pipe alone where simulations of lines fail, each case at three steps.",
         "file written: hard-cases.csv; all of it takes a few minutes",
     )
     _study_arguments(hard, "the cases by their names")
     measured = command(
         "bench",
-        commands.bench,
         "Measure CPU time against error, beside other codes; costs of nodes, of physics and of the start.",
         "files written: CASE.csv, and CASE.png where error is measured; all of it takes half an hour",
     )
@@ -118,10 +112,27 @@ def _set_argument(to: argparse.ArgumentParser) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; mistakes and failures become one line on the error stream."""
-    options = parser().parse_args(arguments)
+    return _perform(parser().parse_args(arguments))
+
+
+def program() -> int:
+    """`main` for the shell, in a process of its own: even where that dies a line on the error stream says so, with exit code 1."""
+    options = parser().parse_args()
+    ended = guarded(lambda: _perform(options))
+    if isinstance(ended, int):
+        return ended
+    from master import commands, post_mortem
+
+    left = post_mortem.bury(commands.run_folder(options), ended) if options.command == "run" else ""
+    return _complain(f"the process {ended.how}{left}", 1)
+
+
+def _perform(options: argparse.Namespace) -> int:
     try:
         with breakable():
-            return int(options.command(options))
+            from master import commands
+
+            return int(getattr(commands, options.command)(options))
     except UsageError as error:
         return _complain(str(error), 2)
     except RunError as error:
@@ -139,4 +150,4 @@ def _complain(message: str, code: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(program())

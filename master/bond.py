@@ -149,7 +149,7 @@ class FmuEnd:
         self._derivative = derivative if derivative in fmu.ports else None
         self.yields = yielding in fmu.ports and all(name in fmu.ports for name in met)
         self._yielding, self._met = (yielding, (*self._result, *met)) if self.yields else ("", ())
-        self.rollback = rollback and fmu.can_rollback
+        self.rollback, self.varies = rollback and fmu.can_rollback, fmu.can_vary_step
         self._saved: ctypes.c_void_p | None = None
         self._moved = False
         self.solves = 0

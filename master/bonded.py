@@ -13,7 +13,8 @@ from master.fmu import Fmu
 from master.ledger import Ledger
 from master.recorder import Signal
 from master.remarks import Remarks
-from master.units import General, Wiring, loaded
+from master.units import General
+from master.wiring import Wiring, loaded
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,12 @@ class Bonded(OnBond):
         sources = [(fmu, energy.columns) for fmu, energy in reported if energy is not None]
         self.ledger = Ledger(sources if len(sources) == 2 else [], rules.energy_check, rules.on_violation, bond.idle_power)
         self._coupling = coupling(rules.scheme, *self._ends, bond, self._macro_step, rules.tolerance, self.ledger.check)
+
+    @property
+    def scheme(self) -> str:
+        """See `Drive`."""
+        fixed = [name for name, fmu in self.units.items() if not fmu.can_vary_step]
+        return super().scheme + (f"; no step is halved, for {' and '.join(fixed)} cannot vary it" if fixed else "")
 
     @property
     def effort(self) -> Effort:

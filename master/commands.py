@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import faulthandler
 import importlib
 import json
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,20 +15,21 @@ from master.errors import UsageError
 from master.fmi.system import write_system
 from master.prepared import prepare
 
-Command = Callable[[argparse.Namespace], int]
-
 
 def run(options: argparse.Namespace) -> int:
     """Simulate a scene; exit code 1 where it did not reach its end or the energy check failed."""
     scene = scenes_of.load(options.scene, options.changes)
-    folder = _folder(options.output or Path("results") / scene.name)
+    folder = _folder(run_folder(options))
     from master.run import simulate  # matplotlib and FMPy take a second to import: not for `scenes` or a bad scene
 
-    if not faulthandler.is_enabled() and sys.__stderr__ is not None:
-        faulthandler.enable(sys.__stderr__)  # an FMU's crash says where
     result = simulate(scene, folder, sys.stderr)
     _say(f"{result.screen}\nresults in {folder}")
     return 0 if result.passed else 1
+
+
+def run_folder(options: argparse.Namespace) -> Path:
+    """Where the results of a run belong."""
+    return options.output or Path("results") / Path(options.scene).stem
 
 
 def statics(options: argparse.Namespace) -> int:

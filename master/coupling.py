@@ -19,8 +19,9 @@ yielding the second round is exact where f is linear in V. Either way two solves
 one does where nothing happens, and more where the extrapolation fails.
 
 A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
-few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. A tolerance below
-the round-off of the ends' answers is met to that round-off: a residual that no longer falls is then accepted.
+few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. No step is halved where
+an FMU takes but one length. A tolerance below the round-off of the ends' answers is met to that round-off: a residual that no longer falls
+is then accepted.
 """
 
 from __future__ import annotations
@@ -64,6 +65,7 @@ class EnergyConsistent:
         self.impedance, self.mobility, self.bond = impedance, mobility, bond
         self.macro_step, self.tolerance, self.check = macro_step, tolerance, check
         self.wanted = macro_step
+        self._smallest = SMALLEST_STEP * macro_step if impedance.varies and mobility.varies else macro_step
         self.counters = Counters()
         self._guess = Extrapolation(mobility.result(), impedance.result(), bond.idle_power)
         self._one = np.eye(bond.size)
@@ -101,7 +103,8 @@ class EnergyConsistent:
             self.mobility.cancel()
             self._length = 0.0
             self.counters.rejected_steps += 1
-            if failures > 1 or step / 2 < SMALLEST_STEP * self.macro_step:
+            if failures > 1 or step / 2 < self._smallest:
+                reason += "; an FMU takes no other step" if self._smallest == self.macro_step else ""
                 raise CouplingFailed(time, step, residual, reason)
             step = self.wanted = step / 2
             self._easy = 0
@@ -218,7 +221,8 @@ class OneSided(EnergyConsistent):
     ) -> None:
         self._foreseen = Foreseen(mobility, bond)
         super().__init__(impedance, self._foreseen, bond, macro_step, tolerance, check)
-        self.wanted, self._easy = FIRST_STEP * macro_step, -PATIENCE  # all short steps add up to whole macro steps
+        if self._smallest < macro_step:
+            self.wanted, self._easy = FIRST_STEP * macro_step, -PATIENCE  # all short steps add up to whole macro steps
         how = "iterated on one side" if impedance.rollback else "not iterated"
         self.words = (
             f"energy-consistent, {how}: without rollback a unit is solved once a step, with its answer foreseen; "

@@ -36,6 +36,7 @@ class Foreseen:
 
     def __init__(self, end: End, bond: Bond) -> None:
         self.end = end
+        self.varies = end.varies
         flow, self._scale = end.result(), bond.flow_increments()
         self._velocity, self._time, self._step = flow, 0.0, 0.0
         self._squares = self._products = np.zeros((bond.size, bond.size))  # of changes of the effort, of those with accelerations

@@ -2,41 +2,56 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
+import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from master.errors import RunError
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SAME = 0.5  # s within which two signals are one request
+_asked = threading.Event()
 
 
 @contextmanager
 def breakable() -> Iterator[None]:
     """Either signal raises KeyboardInterrupt, so that what is open is closed and removed on the way out.
 
-    An FMU that is loading may swallow the exception and complain of something else: that counts as interrupted too.
+    An FMU that is loading may swallow the exception, and complain of something else or go on: what follows in the block finds
+    `postponed` asked already. One Ctrl-C comes twice, from the terminal and from the parent (see `master.guarded`): its second must
+    not cut into the closing.
     """
-    asked = threading.Event()
+    last = -math.inf
 
     def stop(*_: object) -> None:
-        asked.set()
-        raise KeyboardInterrupt
+        nonlocal last
+        before, last = last, clock.monotonic()
+        _asked.set()
+        if last - before > SAME:
+            raise KeyboardInterrupt
 
     with _handling(stop):
         try:
             yield
         except RunError:
-            if asked.is_set():
+            if _asked.is_set():
                 raise KeyboardInterrupt from None
             raise
+        finally:
+            _asked.clear()
 
 
 @contextmanager
 def postponed() -> Iterator[threading.Event]:
     """An event that either signal sets, and nothing else happens: a step is never cut in two."""
-    asked = threading.Event()
-    with _handling(lambda *_: asked.set()):
-        yield asked
+    with _handling(lambda *_: _asked.set()):
+        try:
+            yield _asked
+        finally:
+            _asked.clear()
 
 
 @contextmanager
@@ -45,10 +60,9 @@ def _handling(handler: Callable[..., None]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    signals = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(which, handler) for which in signals]
+    before = [signal.signal(which, handler) for which in SIGNALS]
     try:
         yield
     finally:
-        for which, old in zip(signals, before, strict=True):
+        for which, old in zip(SIGNALS, before, strict=True):
             signal.signal(which, old)

@@ -98,8 +98,9 @@ class _Account:
 class Ledger:
     """Opens with the FMUs initialised and at rest between two steps; call `check` after every step.
 
-    `tolerance` is the closure error allowed, relative to the energy exchanged so far: the sum of |dB| of the first FMU
-    (of a single FMU without a bond: of the largest change of any column); to it comes ROUND_OFF of the largest column.
+    `tolerance` is what is allowed of the closure error, and of the interface residuals' amounts together, relative to the energy
+    exchanged so far: the sum of |dB| of the first FMU (of a single FMU without a bond: of the largest change of any column); to it
+    comes ROUND_OFF of the largest column.
     `action` on a violation: "stop" raises EnergyCheckFailed, "refine" sends the step back to be halved and stops when
     that does not help, "warn" keeps the first complaint and goes on. Without sources, where no FMU reports energies, the
     check is the bond's residual alone, summed with its sign; `idle` is then the power [W] that counts as nothing.
@@ -156,15 +157,16 @@ class Ledger:
         accounts = self._accounts
         largest = max(self.largest, self._largest())
         allowed = self.tolerance * exchanged + ROUND_OFF * largest
-        # the residual of the bond is inside the closure; judged by itself too, so that no other error can hide it
-        passed = abs(closure) <= allowed and abs(residual) <= allowed
+        made = self.interface_residual + abs(residual)
+        # the bond's residuals are inside the closure; judged by themselves too, so that neither another error nor each other can hide them
+        passed = abs(closure) <= allowed and made <= allowed
         if not passed and self._sent_back(time, closure, residual, exchanged, allowed):
             return False
         for account in accounts:
             account.last = account.now
         self.exchanged, self.closure, self.step_residual, self._refused = exchanged, closure, residual, 0
         self.largest, self.allowed = largest, allowed
-        self.interface_residual += abs(residual)
+        self.interface_residual = made
         self.largest_closure = max(self.largest_closure, abs(closure))
         return True
 
@@ -199,8 +201,8 @@ class Ledger:
         own = [f"{account.fmu.name}'s own balance is off by {account.balance:.2g} J" for account in self._accounts]
         own = own or ["the units report no energies"]
         text = (
-            f"energy check failed at {time:.9g} s: closure error {closure:.3g} J of {exchanged:.3g} J exchanged "
-            f"(allowed {allowed:.3g} J); in this step the bond made {residual:.3g} J, {', '.join(own)}"
+            f"energy check failed at {time:.9g} s: closure error {closure:.3g} J of {exchanged:.3g} J exchanged (allowed {allowed:.3g} J); "
+            f"the bond made {residual:.3g} J in this step, {self.interface_residual + abs(residual):.3g} J in all, {', '.join(own)}"
         )
         self._refused += 1
         if self.action == "refine" and self._refused <= REFINEMENTS:

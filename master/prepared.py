@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from master.errors import RunError, UsageError
+from master.interrupts import postponed
 from master.scene import Scene
 
 COMMAND = (sys.executable, "-m", "master.prepare")
@@ -36,9 +37,13 @@ def prepare(scene: Scene, arguments: Sequence[str] = ()) -> Prepared:
     """
     request = json.dumps(scene.mapping, default=str)
     # a session of its own: Ctrl-C is for this process, which then ends the child
-    child = subprocess.Popen([*COMMAND, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    with postponed() as asked:  # an exception within Popen would leave the child behind
+        child = subprocess.Popen([*COMMAND, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
+        early = asked.is_set()
     with child:
         try:
+            if early:
+                raise KeyboardInterrupt
             output, _ = child.communicate(request)
         except BaseException:
             child.kill()

@@ -103,6 +103,15 @@ class Table:
         """Write as CSV; numbers are printed so that they read back to the same bits."""
         path.write_text("\n".join([self.header, *map(csv_line, self.values.tolist()), ""]), encoding="utf-8")
 
+    @classmethod
+    def read(cls, path: Path) -> Table:
+        """The table in a CSV file that may break off within its last line. Raises OSError, ValueError without a row."""
+        header, *rows = path.read_text(encoding="utf-8").split("\n")[:-1]
+        names, units = zip(*(column.removesuffix("]").rsplit(" [", 1) for column in header.split(",")), strict=True)
+        if not rows:
+            raise ValueError(f"{path}: has no rows")
+        return cls(names, units, np.array([[float(value) for value in row.split(",")] for row in rows]))
+
 
 @dataclass(frozen=True)
 class Shapes:

@@ -7,6 +7,7 @@ with it, signals.csv has every step before.
 
 from __future__ import annotations
 
+import os
 import tempfile
 import threading
 import time as clock
@@ -18,7 +19,7 @@ from typing import Any, TextIO
 
 from tqdm import tqdm
 
-from master import figures, report
+from master import figures, post_mortem, report
 from master.bonded import open_bonded, signals
 from master.drive import Drive, open_drive
 from master.errors import RunError, UsageError
@@ -30,7 +31,6 @@ from master.scene import Scene
 from master.units import General
 
 OWN_FILES = ("signals.csv", "shapes.npz", "summary.json", "energy.png", "fig[3-9]_*.png")
-DIED = "the process ended within the run, as it does where an FMU crashes; signals.csv has every step before"
 SLOW = 8.0  # s without a sign of life before a word about compiling
 
 
@@ -63,7 +63,7 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
             stack.callback(patience.cancel)
             simulation, drive, kept = scene.sections.simulation, *_open(scene, stack)
             _clear(folder)
-            report.write_summary(folder / "summary.json", {"scene": scene.name, "status": "died", "message": DIED})
+            report.write_summary(folder / "summary.json", post_mortem.place_holder(scene.name, os.getpid(), drive.ledger.kinds))
             stream = stack.enter_context((folder / "signals.csv").open("w", encoding="utf-8"))
             recorder = Recorder(drive.units, simulation.recording_step, simulation.snapshots, kept, stream)
             started = clock.perf_counter()
@@ -154,7 +154,8 @@ def _scratch_folder(folder: Path) -> Iterator[Path]:
     """A folder in `folder`, or beside it, for files in the making. Raises UsageError where none can be made."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        scratch = tempfile.TemporaryDirectory(prefix=".pipelay-", dir=folder if folder.is_dir() else folder.parent)
+        prefix = post_mortem.scratch_prefix(os.getpid())
+        scratch = tempfile.TemporaryDirectory(prefix=prefix, dir=folder if folder.is_dir() else folder.parent)
     except OSError as error:
         raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
     with scratch as name:

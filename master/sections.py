@@ -62,7 +62,7 @@ class Coupling(Section):
 
     scheme: Literal["energy-consistent", "serial", "parallel"] = "energy-consistent"
     tolerance: float = _number("energy the bond may make in a step, relative", "1", above=0.0, below=1.0, default=1e-9)
-    energy_check: float = _number("limit of residual and closure over the energy exchanged", "1", above=0.0, default=1e-8)
+    energy_check: float = _number("limit of closure and of what the bond makes, over what is exchanged", "1", above=0.0, default=1e-8)
     on_violation: Literal["stop", "refine", "warn"] = "stop"
     rollback: bool = True
 

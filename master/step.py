@@ -20,6 +20,7 @@ class End(Protocol):
 
     rollback: bool
     yields: bool
+    varies: bool  # takes steps of any length
 
     def begin(self) -> None: ...
     def solve(self, time: float, step: float, held: Vector) -> Vector: ...

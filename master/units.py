@@ -1,4 +1,4 @@
-"""Scenes of any two FMUs on a power bond: the tables [units], [bond] and [[connections]], checked against the FMUs' ports.
+"""Scenes of any two FMUs on a power bond: the tables [units], [bond] and [[connections]]; see `master.wiring` for the ports.
 
     [units.a]                            # two units, names of one's own
     fmu = "a.fmu"                        # beside the scene file
@@ -17,18 +17,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from master.bond import Bond, Pair
-from master.errors import UsageError
 from master.fmi.schema import build
-from master.fmu import Fmu, FmuFailed
 from master.ledger import Columns
-from master.port import Port
 from master.sections import Coupling, Section, Simulation, _number
 
 
@@ -156,110 +151,3 @@ def general(mapping: Mapping[str, Any], folder: Path) -> General:
         folder,
         **{key: str(value) for key, value in known.items()},
     )
-
-
-class Wiring:
-    """Ports of two loaded FMUs, found by the names a scene gives; raises UsageError naming the key."""
-
-    def __init__(self, scene: General, fmus: Mapping[str, Fmu]) -> None:
-        self.scene, self.fmus = scene, fmus
-
-    def bond(self) -> Bond:
-        """The bond with the sizes of its ports."""
-        table = self.scene.bond
-        rows = [self._pair(f"bond.pairs[{i}]", row) for i, row in enumerate(table.pairs, 1)]
-        matrices = (
-            ("impedance_derivative", table.impedance, "output"),
-            ("mobility_derivative", table.mobility, "output"),
-            ("yielding", table.impedance, "input"),
-        )
-        for key, unit, causality in matrices:
-            if name := getattr(table, key):
-                port, size = self.port(f"bond.{key}", unit, name, causality), sum(pair.size for pair in rows)
-                if port.size != size * size:
-                    raise UsageError(f"bond.{key} = {name!r}: has {port.size} values, must have {size} x {size}")
-        return Bond(tuple(rows))
-
-    def _pair(self, where: str, row: PairOfPorts) -> Pair:
-        table = self.scene.bond
-        asked = [
-            ("effort", row.effort, table.impedance, "output"),
-            ("flow", row.flow, table.mobility, "output"),
-            ("effort_input" if row.effort_input else "effort", row.effort_input or row.effort, table.mobility, "input"),
-            ("flow_input" if row.flow_input else "flow", row.flow_input or row.flow, table.impedance, "input"),
-            ("end_effort", row.end_effort, table.impedance, "output"),
-            ("end_flow", row.end_flow, table.mobility, "output"),
-            ("met_flow", row.met_flow, table.impedance, "output"),
-        ]
-        ports = [self.port(f"{where}.{key}", unit, name, causality) for key, name, unit, causality in asked if name]
-        for port in ports[1:]:
-            if port.size != ports[0].size:
-                raise UsageError(f"{where}: {ports[0].name} has {ports[0].size} values and {port.name} {port.size}; must be equal")
-        names = (row.effort_input, row.flow_input, row.end_effort, row.end_flow, row.met_flow)
-        return Pair(row.effort, row.flow, row.floor, ports[0].size, *names, row.reverse)
-
-    def connections(self) -> list[tuple[Fmu, str, Fmu, str]]:
-        """Source and target of the further connections."""
-        found = []
-        for i, row in enumerate(self.scene.connections, 1):
-            ends, ports = [], []
-            for key, place, causality in zip(("from", "to"), row, ("output", "input"), strict=True):
-                unit, _, name = place.partition(".")
-                if unit not in self.fmus:
-                    raise UsageError(f"connections[{i}].{key} = {place!r}: must begin with one of {', '.join(self.fmus)} and a dot")
-                ports.append(self.port(f"connections[{i}].{key}", unit, name, causality))
-                ends += [self.fmus[unit], name]
-            if ports[0].size != ports[1].size:
-                raise UsageError(f"connections[{i}]: {row[0]} has {ports[0].size} values and {row[1]} {ports[1].size}; must be equal")
-            found.append(tuple(ends))
-        return found  # type: ignore[return-value]
-
-    def port(self, where: str, unit: str, name: str, causality: str) -> Port:
-        """The real port of this causality."""
-        fmu = self.fmus[unit]
-        port = fmu.ports.get(name)
-        if port is None:
-            there = ", ".join(fmu.names(causality)) or "none"
-            raise UsageError(f"{where} = {name!r}: unit {unit} has no such {causality}; there are {there}")
-        if port.causality != causality:
-            raise UsageError(f"{where} = {name!r}: is of causality {port.causality} in unit {unit}, must be {causality}")
-        if port.kind != "Real":
-            raise UsageError(f"{where} = {name!r}: is {port.kind} in unit {unit}, must be Real")
-        return port
-
-    def check_settings(self) -> None:
-        """Recorded outputs, energies, parameters and inputs exist."""
-        for unit, table in self.scene.units.items():
-            for name in table.outputs:
-                self.port(f"units.{unit}.outputs", unit, name, "output")
-            if table.energy is not None:
-                kinds = {key: getattr(table.energy, key) for key in ("stored", "supplied", "dissipated")} | {"bond": (table.energy.bond,)}
-                for key, names in kinds.items():
-                    for name in names:
-                        self.port(f"units.{unit}.energy.{key}", unit, name, "output")
-            for name, value in self.scene.settings[unit]["inputs"].items():
-                port = self.port(f"units.{unit}.inputs.{name}", unit, name, "input")
-                if (len(value) if isinstance(value, list) else 1) != port.size:
-                    raise UsageError(f"units.{unit}.inputs.{name} = {value}: must have {port.size} values")
-            for name, value in self.scene.settings[unit]["parameters"].items():
-                if (known := self.fmus[unit].ports.get(name)) is None or known.causality in ("output", "input"):
-                    there = ", ".join(self.fmus[unit].names("parameter")) or "none"
-                    raise UsageError(f"units.{unit}.parameters.{name} = {value}: unknown parameter; there are {there}")
-
-
-@contextmanager
-def loaded(scene: General) -> Iterator[Wiring]:
-    """The FMUs of a scene, loaded and checked, not yet initialised. Raises UsageError for what the scene has wrong."""
-    with ExitStack() as stack:
-        fmus: dict[str, Fmu] = {}
-        for name, unit in scene.units.items():
-            path = scene.folder / unit.fmu
-            if not path.is_file():
-                raise UsageError(f"units.{name}.fmu = {unit.fmu!r}: no such file in {scene.folder.resolve()}")
-            try:
-                fmus[name] = stack.enter_context(Fmu(path, name))
-            except FmuFailed as error:
-                raise UsageError(f"units.{name}.fmu = {unit.fmu!r}: {error}") from None
-        wiring = Wiring(scene, fmus)
-        wiring.check_settings()
-        yield wiring

@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from types import SimpleNamespace
 
 import numpy as np
@@ -258,6 +258,19 @@ def test_an_fmu_that_swallows_the_interruption_while_loading_is_interrupted_all_
     assert main(["run", "-o", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err == "pipelay: interrupted\n"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interruption_that_the_loading_swallows_ends_the_run_after_its_first_step(still, monkeypatch, tmp_path, capsys):
+    def swallow(*_):
+        with suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    still()
+    monkeypatch.setattr(run, "prepare", swallow)
+    assert main(["run", *SHORT, "-o", str(tmp_path)]) == 1
+    assert "interrupted at 0.1 s of 2 s" in capsys.readouterr().out
+    monkeypatch.setattr(run, "prepare", lambda _: None)
+    assert main(["run", *SHORT, "-o", str(tmp_path)]) == 0  # and no other run
 
 
 def test_the_preparation_bears_that_nobody_reads_its_answer():

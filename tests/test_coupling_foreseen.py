@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from units.toys import build_pair, tied
 
+from master.bond import Bond, Pair
 from master.coupling import CouplingFailed, OneSided
 from master.drive import open_drive, pose_gap
 from master.fmi.build import cache_folder
+from master.foreseen import Foreseen
 from master.prepared import prepare
 from master.scene import load
 from master.stability import bodies, study
@@ -58,6 +60,56 @@ def test_the_slope_of_an_end_without_one_is_measured(files):
         slope = pair.coupling.mobility.derivative()
         np.testing.assert_allclose(np.diag(slope)[:2], 0.1 / 2.0, rtol=0.1)
         assert abs(pair.ledger.closure) < 0.05 * pair.ledger.exchanged
+
+
+class Body:
+    """An end with this inverse of its mass, that offers neither rollback nor derivative."""
+
+    rollback, yields, varies = False, False, True
+
+    def __init__(self, inverse):
+        self.inverse, self.velocity, self.solves = inverse, np.zeros(len(inverse)), 0
+
+    def result(self):
+        return self.velocity
+
+    def solve(self, time, step, held):
+        flow = self.velocity + step / 2 * self.inverse @ held
+        self.velocity = 2 * flow - self.velocity
+        return flow
+
+    def derivative(self):
+        return None
+
+
+@pytest.mark.parametrize(
+    ("inverse", "passive"),
+    [
+        ([[2.0, 0.5], [0.5, 1.0]], [[2.0, 0.5], [0.5, 1.0]]),
+        ([[2.0, 0.0], [0.0, -1.0]], [[2.0, 0.0], [0.0, 0.0]]),
+        ([[1.0, 0.7], [0.0, 1.0]], [[1.0, 0.35], [0.35, 1.0]]),
+    ],
+    ids=["a mass", "one that gives energy", "one without reciprocity"],
+)
+def test_the_measured_slope_is_symmetric_and_not_negative_whatever_the_end_does(inverse, passive):
+    foreseen, random = Foreseen(Body(np.array(inverse)), Bond((Pair("f", "v", 1e-6, 2),))), np.random.default_rng(1)
+    for i in range(60):
+        held, step = random.normal(size=2), 0.1
+        foretold = foreseen.solve(i * step, step, held)
+        foreseen.take(i * step, step, held, foretold)
+    np.testing.assert_allclose(foreseen.derivative(), 0.1 / 2 * np.array(passive), atol=1e-4)
+
+
+@pytest.mark.parametrize("rollback", [True, False])
+def test_what_the_other_end_did_not_follow_it_is_told_to_make_up_for(rollback):
+    ends = [Body(np.eye(2)) for _ in range(2)]
+    expected = []
+    for end, missed in zip(ends, (0.0, 0.25), strict=True):
+        end.rollback = rollback
+        foreseen, held = Foreseen(end, Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
+        foreseen.take(0.0, 0.1, held, end.velocity + 0.05 * held - missed)  # the end answers `missed` more than was foretold
+        expected.append(foreseen.solve(0.1, 0.2, held))
+    np.testing.assert_allclose(expected[1] - expected[0], 0.25 * 0.1 / 0.2, rtol=1e-12)
 
 
 def test_a_step_that_one_end_refuses_is_halved_while_the_other_stands_still_and_is_final_once_it_has_moved(files):

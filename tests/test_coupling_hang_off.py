@@ -53,7 +53,8 @@ def final(step, duration=2.0, changes=()):
         while drive.time < duration:
             drive.advance(duration)
         assert drive.effort.rejected_steps == 0
-        found = {name: pipe.get(name) for name in ("node_position", "node_tension", "end_moment")} | {"position": vessel.get("position")}
+        found = {name: pipe.get(name) for name in ("node_position", "node_tension", "end_moment", "force", "moment")}
+        found |= {name: vessel.get(name) for name in ("position", "velocity", "angular_velocity")}
         return found | {"node_displacement": found["node_position"] - start[0], "displacement": found["position"] - start[1]}
 
 
@@ -77,3 +78,15 @@ def test_with_matched_steps_the_fmus_are_pipe_and_vessel_solved_as_one(step, tol
     *_, last = march(loaded)[2]
     np.testing.assert_allclose(found["node_position"].reshape(-1, 3), last.pipe.position, rtol=0.0, atol=1e-9 * 1200.0)
     np.testing.assert_allclose(found["position"][:2], last.vessel.position[:2], rtol=1e-9, atol=1e-9)
+    means = {"force": -last.force[:3], "moment": -last.force[3:], "velocity": last.velocity[:3], "angular_velocity": last.velocity[3:]}
+    for name, mean in means.items():
+        np.testing.assert_allclose(found[name], mean, rtol=0.0, atol=1e-9 * np.linalg.norm(mean))
+
+
+def test_a_load_from_a_table_moves_both_alike():
+    push = ["tables.environment=[{time=0}, {time=1.3, force=[2e5, 1e5, 0], moment=[0, 0, 1e6]}, {time=3, force=[0, 3e5, 0]}]"]
+    found, (*_, last) = final(0.5, 4.0, push), march(moving("paper", [*MOVED, *push], 0.5, 4.0))[2]
+    still = final(0.5, 4.0)
+    np.testing.assert_allclose(found["node_position"].reshape(-1, 3), last.pipe.position, rtol=0.0, atol=1e-9 * 1200.0)
+    np.testing.assert_allclose(found["position"][:2], last.vessel.position[:2], rtol=1e-9, atol=1e-9)
+    assert np.abs(found["position"] - still["position"]).max() > 1e-3

@@ -5,6 +5,7 @@ import pytest
 from units.toys import BODY_COLUMNS, SPRING_COLUMNS, build_pair, tied
 
 from master.bond import FmuEnd
+from master.coupling import Step
 from master.fmu import Fmu, FmuFailed
 from master.ledger import Columns, EnergyCheckFailed, Ledger
 
@@ -88,6 +89,16 @@ def test_refine_halves_a_step_whose_residual_the_coupling_let_pass(files):
     assert runs["refine"][1] > 0
 
 
+def test_residuals_that_cancel_do_not_hide_each_other():
+    def step(moved, residual):
+        return Step(0.0, 1.0, np.array([moved]), np.array([1.0]), residual, 1)
+
+    ledger = Ledger([], tolerance=1e-3)
+    assert all(ledger.check(step(*done)) for done in ((10.0, 0.0), (0.1, 4e-3), (0.1, -4e-3)))
+    with pytest.raises(EnergyCheckFailed, match=r"closure error 0\.004 J .* the bond made 0\.004 J in this step, 0\.012 J in all"):
+        ledger.check(step(0.1, 4e-3))
+
+
 def test_refine_gives_up_on_what_no_step_can_cure(files):
     with tied(files, {"gain": -1.0}, PUSH, 0.1, action="refine") as pair, pytest.raises(EnergyCheckFailed):
         pair.run(0.1, 1.0)
@@ -102,6 +113,18 @@ def test_the_message_names_the_fmu_that_does_not_balance_itself(files):
     text = str(caught.value)
     assert abs(float(text.split("spring's own balance is off by ")[1].split()[0])) < 1e-12
     assert abs(float(text.split("body's own balance is off by ")[1].split()[0])) > 1e-4
+
+
+def test_energy_that_vanishes_fails_as_well_as_energy_that_appears(files):
+    silent = Columns(BODY_COLUMNS.energy, BODY_COLUMNS.work, (), BODY_COLUMNS.bond)  # without what its damper takes
+    with tied(files, {}, {"damping": 0.5, **PUSH}, 0.1) as pair:
+        sources = [(pair.spring, SPRING_COLUMNS), (pair.body, silent)]
+        strict, patient = Ledger(sources), Ledger(sources, action="warn")
+        pair.coupling.check = patient.check
+        pair.run(0.1, 1.0)
+        assert patient.largest_closure == pytest.approx(pair.body.get("damping_dissipation")[0], rel=1e-9)
+        with pytest.raises(EnergyCheckFailed, match="closure error -"):
+            strict.record(1.0)
 
 
 def test_one_fmu_alone_is_balanced_with_its_bond_as_work_from_outside(files):

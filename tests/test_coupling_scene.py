@@ -1,14 +1,23 @@
 """A scene of any two FMUs from the command line: what it computes, what it refuses, and what an FMU that dies leaves behind."""
 
 import json
+import os
+import pty
+import signal
 import subprocess
 import sys
+from contextlib import suppress
+from time import sleep
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 from units.toys import build_pair
 
 from master.__main__ import main
+from master.fmi.build import Recipe, build_fmu
+from master.stability.coupled import UNITS
+from master.stability.published import LIM
 
 SCENE = """
 title = "A spring and a body"
@@ -46,12 +55,28 @@ def folder(tmp_path_factory):
         patch.setenv("PIPELAY_CACHE", str(tmp_path_factory.mktemp("cache")))
         place = tmp_path_factory.mktemp("scene")
         build_pair(place, failure={"above": 1e9})
+        rewritten(place / "spring.fmu", place / "fixed.fmu", {'StepSize="true"': 'StepSize="false"'})
+        kilonewton = {'"N"': '"kN"', '<BaseUnit kg="1" m="1" s="-2"': '<BaseUnit factor="1000" kg="1" m="1" s="-2"'}
+        rewritten(place / "spring.fmu", place / "kilo.fmu", kilonewton)
+        for unit in ("Spring", "Mass"):
+            build_fmu(Recipe(UNITS / "linear_fmu", f"slave.{unit}Unit", {}), place / f"linear_{unit}.fmu".lower())
         energy = silent = SCENE
         for mark, line in ENERGY.items():
             energy, silent = energy.replace(mark, line), silent.replace(mark, "")
         (place / "tied.toml").write_text(energy)
         (place / "silent.toml").write_text(silent)
         yield place
+
+
+def rewritten(fmu, target, changes):
+    """A copy of an FMU with another model description."""
+    with ZipFile(fmu) as source, ZipFile(target, "w") as copy:
+        for name in source.namelist():
+            content = source.read(name)
+            for old, new in changes.items() if name == "modelDescription.xml" else ():
+                assert old.encode() in content
+                content = content.replace(old.encode(), new.encode())
+            copy.writestr(name, content)
 
 
 def ran(folder, out, *changes, scene="tied"):
@@ -87,6 +112,49 @@ def test_it_runs_like_any_other_and_its_ledger_closes(folder, tmp_path, capsys):
     assert "energy check" in capsys.readouterr().out
 
 
+def test_one_pair_of_vectors_serves_as_well_as_two(folder, tmp_path):
+    one = 'bond.pairs=[{effort="force", flow="velocity", floor=1e-6}]'
+    for name, change in (("two", "title='two'"), ("one", one)):
+        assert ran(folder, tmp_path / name, change)[0] == 0
+    both = [columns(tmp_path / name) for name in ("one", "two")]
+    for name in ("mass.position[1]", "mass.position[2]", "coil.stretch[1]"):
+        np.testing.assert_allclose(both[0][name], both[1][name], atol=1e-9)
+
+
+def test_a_pair_of_scalars_couples_the_published_oscillator(folder, tmp_path):
+    """The LIM oscillator from a scene file, against the matrix exponential."""
+    energy = 'energy = {stored = ["kinetic_energy", "elastic_energy"], dissipated = ["damping_dissipation"], bond = "bond_work"}'
+    halves = (("spring", LIM.first), ("mass", LIM.second))
+    lines = ["[simulation]", "duration = 1.0", "macro_step = 1e-3", "[bond]", "impedance = 'spring'", "mobility = 'mass'"]
+    lines.append("pairs = [{effort = 'force', flow = 'velocity', floor = 1e-6}]")
+    for name, parameters in halves:
+        values = ", ".join(f"{key} = {value}" for key, value in parameters.items())
+        lines += [f"[units.{name}]", f"fmu = 'linear_{name}.fmu'", f"parameters = {{{values}}}", "outputs = ['position']", energy]
+    (folder / "lim.toml").write_text("\n".join(lines))
+    code, summary = ran(folder, tmp_path, scene="lim")
+    found = columns(tmp_path)
+    assert code == 0
+    assert summary["ledger_closure_J"] <= 1e-9 * summary["exchanged_energy_J"]
+    exact = LIM.exact(found["time"])
+    np.testing.assert_allclose(found["spring.position"], exact[:, 0], atol=5e-3)  # of 20 m
+    np.testing.assert_allclose(found["mass.position"], exact[:, 1], atol=5e-3)
+
+
+FIXED = "units.coil.fmu='fixed.fmu'"
+
+
+def test_no_other_step_is_asked_of_a_unit_that_cannot_vary_it(folder, tmp_path, capsys):
+    code, summary = ran(folder, tmp_path, FIXED)
+    assert (code, summary["macro_steps"]) == (0, 50)
+    assert "no step is halved, for coil cannot vary it" in capsys.readouterr().out
+    code, summary = ran(folder, tmp_path, FIXED, failing("message"))
+    assert (code, summary["rejected_steps"]) == (1, 1)
+    assert "with a step of 0.1 s: coil: step of 0.1 s at 2 s: planted" in summary["message"]
+    assert summary["message"].endswith("an FMU takes no other step")
+    code, summary = ran(folder, tmp_path, FIXED, "coupling.rollback=false", "coupling.energy_check=2.0")
+    assert (code, summary["macro_steps"]) == (0, 50)
+
+
 def test_without_reported_energies_the_check_is_the_residual_alone_and_says_so(folder, tmp_path, capsys):
     code, summary = ran(folder, tmp_path, scene="silent")
     assert code == 0
@@ -118,7 +186,37 @@ def test_the_check_measures_the_same_for_every_scheme(folder, tmp_path):
     assert left["energy-consistent"] < 1e-9 < 1e-2 < left["serial"] < left["parallel"]
 
 
+def test_what_the_coupling_lets_pass_is_warned_of_refined_or_stops_the_run_as_the_scene_says(folder, tmp_path):
+    sloppy = "units.coil.parameters={stiffness=4.0, hardening=30.0}", "coupling.tolerance=1e-3", "coupling.energy_check=1e-6"
+    runs = {action: ran(folder, tmp_path / action, *sloppy, f"coupling.on_violation='{action}'") for action in ("warn", "refine", "stop")}
+    ends = {action: (code, summary["status"], summary["energy_check_passed"]) for action, (code, summary) in runs.items()}
+    assert ends == {"warn": (1, "completed", False), "refine": (0, "completed", True), "stop": (1, "stopped", False)}
+    summary = runs["refine"][1]
+    assert summary["rejected_steps"] > 0
+    assert max(summary["ledger_closure_J"], summary["interface_residual_J"]) <= 1e-6 * summary["exchanged_energy_J"]
+    assert runs["warn"][1]["ledger_closure_J"] > 1e-6 * runs["warn"][1]["exchanged_energy_J"]
+    assert runs["stop"][1]["duration_s"] < 5.0
+
+
 MISTAKES = {
+    "a last step that is shorter": (
+        f"{FIXED}\nsimulation.duration=5.03",
+        "simulation.duration = 5.03: must be a multiple of macro_step = 0.1 s, which unit coil cannot vary",
+    ),
+    "a step to be refined": (
+        f"{FIXED}\ncoupling.on_violation='refine'",
+        "coupling.on_violation = 'refine': must be stop or warn, for unit coil cannot vary its step",
+    ),
+    "kilonewtons": ("units.coil.fmu='kilo.fmu'", "bond.pairs[1]: force is in kN and force in N; must be the same"),
+    "no power": (
+        'bond.pairs=[{effort="moment", flow="velocity", effort_input="moment", flow_input="velocity", floor=1}]',
+        "bond.pairs[1]: moment [N.m] times velocity [m/s] must be a power in W",
+    ),
+    "no energy": (
+        "units.coil.energy={stored=['stretch'], bond='force'}",
+        "units.coil.energy.bond = 'force': is in N, must be in J",
+    ),
+    "misspelt key": ("bond.pairs=[{efort='force', flow='velocity', floor=1}]", "bond.pairs[1].efort = 'force': unknown key"),
     "no such file": ('units.coil.fmu="none.fmu"', "units.coil.fmu = 'none.fmu': no such file"),
     "no FMU": ('units.coil.fmu="tied.toml"', "units.coil.fmu = 'tied.toml': "),
     "unknown unit": ('bond.impedance="cable"', "bond.impedance = 'cable': must be one of coil, mass"),
@@ -148,7 +246,8 @@ MISTAKES = {
 
 @pytest.mark.parametrize(("change", "message"), MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_is_one_line_and_exit_code_2(folder, tmp_path, capsys, change, message):
-    assert main(["run", str(folder / "tied.toml"), "--set", change, "-o", str(tmp_path / "out")]) == 2
+    changes = [f"--set={line}" for line in change.split("\n")]
+    assert main(["run", str(folder / "tied.toml"), *changes, "-o", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"pipelay: {message}")
     assert error.count("\n") == 1
@@ -171,15 +270,82 @@ def test_an_fmu_that_fails_for_good_ends_the_run_with_its_results_so_far(folder,
     assert ("not finite" if kind == "nan" else "planted") in capsys.readouterr().out
 
 
-def test_an_fmu_that_crashes_leaves_its_results_so_far_and_a_summary_that_says_so(folder, tmp_path):
-    call = [sys.executable, "-m", "master", "run", str(folder / "tied.toml"), "--set", failing("crash"), "-o", str(tmp_path)]
-    done = subprocess.run(call, check=False, capture_output=True, text=True)
-    assert done.returncode not in (0, 1, 2)  # the signal's
-    assert "in step" in done.stderr  # where
-    np.testing.assert_allclose(columns(tmp_path)["time"], 0.1 * np.arange(21), atol=1e-12)
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["status"] == "died"
-    assert "signals.csv" in summary["message"]
+def command(folder, out, kind):
+    return [sys.executable, "-m", "master", "run", str(folder / "tied.toml"), "--set", failing(kind), "-o", str(out)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "how"),
+    [("crash", "was ended by SIGSEGV"), ("abort", "was ended by SIGABRT"), ("exit", "was ended from within, with exit code 0")],
+)
+def test_an_fmu_that_takes_its_process_with_it_ends_in_one_line_and_the_results_so_far(folder, tmp_path, kind, how):
+    out = tmp_path / "out"
+    done = subprocess.run(command(folder, out, kind), check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == f"pipelay: the process {how} at t = 2 s; results so far in {out}\n"
+    found, summary = columns(out), json.loads((out / "summary.json").read_text())
+    np.testing.assert_allclose(found["time"], 0.1 * np.arange(21), atol=1e-12)
+    assert (summary["status"], summary["duration_s"]) == ("died", pytest.approx(2.0))
+    assert summary["message"] == f"the process {how} at t = 2 s"
+    assert summary["exchanged_energy_J"] == found["exchanged"][-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert sorted(path.name for path in out.iterdir()) == ["energy.png", "signals.csv", "summary.json"]
+
+
+def test_the_results_of_an_earlier_run_are_not_taken_for_those_of_one_that_dies_before_its_own(folder, tmp_path):
+    out = tmp_path / "out"
+    ran(folder, out)
+    before = (out / "summary.json").read_text()
+    died = "import os, sys, master.bonded; master.bonded.Bonded.__init__ = lambda *_: os._exit(3)"
+    call = f"{died}; sys.argv[1:] = {command(folder, out, 'crash')[3:]!r}; from master.__main__ import program; sys.exit(program())"
+    done = subprocess.run([sys.executable, "-c", call], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (1, "pipelay: the process was ended from within, with exit code 3\n")
+    assert (out / "summary.json").read_text() == before
+
+
+def until_slow(out):
+    """Until a run has taken some of its slow steps."""
+    while not (out / "signals.csv").exists() or (out / "signals.csv").read_bytes().count(b"\n") < 23:
+        sleep(0.02)
+
+
+def begun(folder, out):
+    """A run that has taken some of its slow steps."""
+    child = subprocess.Popen(command(folder, out, "wait"), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    until_slow(out)
+    return child
+
+
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_the_command_is_passed_on_and_ends_the_run_at_the_next_step(folder, tmp_path, which):
+    child = begun(folder, tmp_path)
+    child.send_signal(which)
+    printed, complaint = child.communicate()
+    assert (child.returncode, complaint) == (1, "")
+    assert "interrupted at" in printed
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "interrupted"
+
+
+def test_ctrl_c_at_a_terminal_reaches_both_processes_and_ends_the_run_once(folder, tmp_path):
+    process, terminal = pty.fork()
+    if process == 0:
+        os.execv(sys.executable, command(folder, tmp_path, "wait"))
+    until_slow(tmp_path)
+    os.write(terminal, b"\x03")
+    printed = b""
+    with suppress(OSError):  # how a terminal ends
+        while True:
+            printed += os.read(terminal, 4096)
+    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 1
+    assert b"interrupted at" in printed
+    assert b"Traceback" not in printed
+
+
+def test_the_run_ends_with_a_command_that_is_killed(folder, tmp_path):
+    child = begun(folder, tmp_path)
+    child.kill()
+    child.communicate()  # until nobody holds the streams, its worker neither
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "interrupted"
 
 
 def test_what_a_unit_says_of_its_start_and_of_its_steps_is_in_the_report(folder, tmp_path, capsys):

@@ -17,7 +17,7 @@ REPEATS = 3
 LARGEST_START, LARGEST_COMPILATION = 3.0, 60.0  # s, of CPU time
 _COMPILED = (
     "import sys; from numba.core import event\n"
-    "with event.install_recorder('numba:compile') as seen: import pipe_fmu, vessel_fmu, master.__main__\n"
+    "with event.install_recorder('numba:compile') as seen: import pipe_fmu, vessel_fmu, master.commands\n"
     "sys.exit(len(seen.buffer))"
 )
 _FIRST = (

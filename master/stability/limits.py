@@ -47,7 +47,7 @@ class Limit:
 class UnitEnd:
     """An end of a bond that is a unit of this process: state, port to set, ports to read."""
 
-    rollback, yields = True, False
+    rollback, yields, varies = True, False, True
 
     def __init__(self, unit: Any, held: str, mean: str, answer: str, derivative: str, sign: float, before: float) -> None:
         self.unit, self.solves = unit, 0

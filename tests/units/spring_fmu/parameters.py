@@ -14,7 +14,9 @@ class Failure:
     above: float = field(default=0.0, metadata={"unit": "s", "min": 0.0, "doc": "longest step that succeeds"})
     start: float = field(default=0.0, metadata={"unit": "s", "doc": "failing from here"})
     end: float = field(default=1e9, metadata={"unit": "s", "doc": "to here"})
-    kind: Literal["message", "arithmetic", "bug", "nan", "crash", "remark"] = field(default="message", metadata={"doc": "how it fails"})
+    kind: Literal["message", "arithmetic", "bug", "nan", "crash", "abort", "exit", "wait", "remark"] = field(
+        default="message", metadata={"doc": "how it fails"}
+    )
 
 
 @dataclass(frozen=True)

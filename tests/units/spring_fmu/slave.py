@@ -6,7 +6,9 @@ Stands in for the pipe: takes the mean velocity over the step, returns the mean 
 from __future__ import annotations
 
 import math
+import os
 import signal
+from time import sleep
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -84,9 +86,16 @@ class SpringUnit:
                 raise FloatingPointError("invalid value encountered in a planted place")
             if planted.kind == "crash":
                 signal.raise_signal(signal.SIGSEGV)
+            if planted.kind == "abort":
+                os.abort()
+            if planted.kind == "exit":
+                os._exit(0)
+            if planted.kind == "wait":
+                sleep(0.1)
             if planted.kind == "message":
                 return "planted failure: residual 1.0 after 20 iterations, 50 % left"
-            self.remark, broken = ("planted remark, 50 % heard", 0.0) if planted.kind == "remark" else ("", math.nan)
+            self.remark = "planted remark, 50 % heard" if planted.kind == "remark" else ""
+            broken = math.nan if planted.kind == "nan" else 0.0
         else:
             self.remark, broken = "", 0.0
         old, v = self.state.x, np.concatenate([inputs["velocity"], inputs["angular_velocity"]])
