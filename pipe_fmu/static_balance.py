@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from .block_tridiagonal import condense, factorize, substitute
 from .compiled import kernel
+from .ends import condense_top, hold_foot, hold_foot_residual, top_correction
 from .line import Array, Line, Water
-from .newton import condense_top, hold_foot, hold_foot_residual, top_correction
 from .so3 import exp, multiply, normalize
 from .stability import positive
 from .static_kernel import attitude, static_system

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pipe_helpers import P16, bar, started, straight
 
-from pipe_fmu import PipeParameters, block_tridiagonal, newton, recovery
+from pipe_fmu import PipeParameters, block_tridiagonal, ends, recovery
 from pipe_fmu.environment import Environment
 from pipe_fmu.line import Water
 
@@ -37,8 +37,8 @@ def test_tangent_of_the_held_foot_is_the_derivative_of_its_residual(clamped):
     diagonal, upper, x = random.normal(size=(3, 6, 6)), random.normal(size=(2, 6, 6)), random.normal(size=(3, 6))
     residual = np.zeros((3, 6))
     residual[0] = diagonal[0] @ x[0] + upper[0] @ x[1]
-    newton.hold_foot(line, quaternion, diagonal, upper)
-    newton.hold_foot_residual(line, quaternion, tuple(x[0, 3:]), residual)
+    ends.hold_foot(line, quaternion, diagonal, upper)
+    ends.hold_foot_residual(line, quaternion, tuple(x[0, 3:]), residual)
     held = 6 if clamped else 3
     np.testing.assert_allclose((diagonal[0] @ x[0] + upper[0] @ x[1])[held:], residual[0, held:], rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(diagonal[0, :held], np.eye(6)[:held])
