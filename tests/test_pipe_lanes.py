@@ -4,12 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from numba import njit
+from numba.core.errors import TypingError
+from pipe_helpers import bar
 
-from pipe_fmu.columns import column, fill_straight, room
-from pipe_fmu.compiled import inner
+from pipe_fmu.columns import fill_straight, line_columns, room
 from pipe_fmu.lane_arrays import grid, group, lane, row, rows_of_six, six
 from pipe_fmu.lanes import WIDTH, above, below, lane_by_lane, largest, total
 
+inner = njit(error_model="numpy")  # as the package's own, but never taken from a cache
 A = np.array([1.5, -2.0, 0.25, -0.5, 3.0, -4.5, 0.125, -8.0])
 B = np.array([-0.5, 4.0, 2.0, -3.0, 3.0, 1.0, -7.0, -0.25])
 
@@ -69,6 +72,11 @@ def test_a_function_of_one_number_is_taken_to_every_lane():
     np.testing.assert_array_equal(out, [np.where(A > 0, A * A, A), np.where(A > 0, -A, 1.0)])
 
 
+def test_lanes_of_an_array_that_is_not_contiguous_are_refused():
+    with pytest.raises(TypingError):
+        reduced(np.arange(2.0 * WIDTH)[::2], 0.0)
+
+
 @inner
 def through_scratch(a, out, numbers):
     cells, line, sixes = grid(2, 3), row(2), rows_of_six(6)
@@ -111,6 +119,16 @@ def test_behind_its_end_a_line_goes_on_straight_and_without_what_would_add():
     fill_straight(position, out)
     ahead = np.arange(1, room(3) - 2)[:, None] * [2.0, 1.0, -0.5]
     np.testing.assert_array_equal(out.T, np.vstack([position, position[-1] + ahead]))
-    kept, gone = (column(np.array([2.0, 5.0]), 3, beyond) for beyond in (1.0, 0.0))
-    np.testing.assert_array_equal(kept, [2.0] + [5.0] * (room(3) - 1))
-    np.testing.assert_array_equal(gone, [2.0, 5.0] + [0.0] * (room(3) - 2))
+    present = {"weight": np.ones(2), "damping": np.ones(2), "drag": np.ones((2, 2)), "offset": np.ones(3)}
+    present |= {"added_mass": np.ones((3, 3)), "spin_damping": np.ones((3, 3))}
+    line = bar(10.0, 3, axial=1e5, shear=1e5, torsion=80.0, bending=100.0)[1]._replace(**present)
+    for name, before, there in zip(line._fields, line, line_columns(line), strict=True):
+        if name in ("bed", "foot_clamped", "top_clamped", "numerical_damping"):
+            continue
+        beyond = there[..., len(before) :]
+        assert there.shape[-1] == room(3)
+        np.testing.assert_array_equal(there[..., : len(before)], before.T)
+        if name in ("length", "share", "diameter"):  # shape, which goes on
+            np.testing.assert_array_equal(beyond, np.broadcast_to(before[-1][..., None], beyond.shape))
+        else:
+            assert not beyond.any()
