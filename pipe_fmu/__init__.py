@@ -2,8 +2,8 @@
 
 `Pipe` computes, `PipeUnit` names the ports. Modules, from the facade down:
 slave (substeps), pipe, model (mesh, catenary), recovery, energy, statics (relaxation, static_balance, stability, static_kernel,
-static_drag), integrator (newton, step_kernel, element_kernel, node_kernel), ends, loads (hydrodynamics, seabed), element, assembly,
-block_tridiagonal, so3, and the lanes they work in (columns, lane_arrays, lanes).
+static_drag), integrator (newton, step_kernel, element_kernel, node_kernel), ends, loads (hydrodynamics, seabed), element
+(geometric_stiffness, relative_rotation), assembly, block_tridiagonal, so3, and the lanes they work in (columns, lane_arrays, lanes).
 """
 
 from .model import resolve

@@ -4,7 +4,8 @@ import math
 
 from .assembly import add_matrix, add_vector, expand, expand_matrix
 from .compiled import inner
-from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, resultant, strains
+from .element import ROWS, STRAINS, frame, gradients, resultant, strains
+from .geometric_stiffness import geometric_stiffness
 from .lane_arrays import grid, group, lane, row
 from .lanes import above, below
 from .loads import add_drag, add_mean_contact, bed_on_sag

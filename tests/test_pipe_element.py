@@ -7,7 +7,7 @@ import pytest
 from pipe_helpers import rotation, rotation_vector_quaternion, times
 from scipy.linalg import expm
 
-from pipe_fmu import assembly, element
+from pipe_fmu import assembly, element, geometric_stiffness
 from pipe_fmu.line import shear_stiffness
 
 LENGTH = 7.0
@@ -78,7 +78,7 @@ def test_geometric_stiffness_is_the_derivative_of_the_gradients(bend, share):
     at = pose(bend)
     stress = np.array([3.0, -1.2, 0.7, 2.1, -0.8, 1.7, 0.9])
     got = np.empty((9, 9))
-    element.geometric_stiffness(*element.frame(*(tuple(x) for x in at)), LENGTH, share, stress, got)
+    geometric_stiffness.geometric_stiffness(*element.frame(*(tuple(x) for x in at)), LENGTH, share, stress, got)
     expected = central(lambda motion: stress @ gradients(*moved(*at, motion), share))
     np.testing.assert_allclose(got, expected, atol=2e-8 * np.abs(expected).max())  # step^2 and 1e-15 / step
 
