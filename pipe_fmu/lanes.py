@@ -188,12 +188,13 @@ def _sum(a, b):
 
 
 @register_jitable
-def _larger(a, b):
+def larger(a, b):
+    """The larger of two numbers; NaN if one is."""
     return a if a >= b or a != a else b
 
 
 _reduction(total, _sum)
-_reduction(largest, _larger)
+_reduction(largest, larger)
 
 
 @overload(below)

@@ -8,6 +8,7 @@ from .block_tridiagonal import SIZE, condense, factorize, substitute
 from .columns import line_columns, take
 from .compiled import inner, kernel
 from .ends import condense_top, hold_foot, hold_foot_residual, top_correction, yielding
+from .lanes import larger
 from .node_kernel import advance
 from .state import PipeState
 from .step_kernel import assemble, old_columns
@@ -25,16 +26,13 @@ LOST = 1e12  # residual, and element force over the axial stiffness, from which 
 
 @inner
 def _size(residual, force_scale, moment_scale, top_clamped):
-    """Largest free residual over its scale."""
+    """Largest free residual over its scale; NaN if one is."""
     worst = 0.0
     n = residual.shape[0]
-    for i in range(n if not top_clamped else n - 1):
-        held = i == n - 1
-        for j in range(3):
-            force = 0.0 if held else math.fabs(residual[i, j]) / force_scale
-            ratio = max(force, math.fabs(residual[i, 3 + j]) / moment_scale)
-            if not ratio <= worst:
-                worst = ratio
+    held = SIZE if top_clamped else 3
+    for i in range(n):
+        for j in range(held if i == n - 1 else 0, SIZE):
+            worst = larger(worst, math.fabs(residual[i, j]) / (force_scale if j < 3 else moment_scale))
     return worst
 
 

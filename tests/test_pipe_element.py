@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from pipe_helpers import rotation, rotation_vector_quaternion, times
 from scipy.linalg import expm
+from scipy.special import bernoulli, factorial
 
-from pipe_fmu import assembly, element, geometric_stiffness
+from pipe_fmu import assembly, element, geometric_stiffness, relative_rotation
 from pipe_fmu.line import shear_stiffness
 
 LENGTH = 7.0
@@ -180,3 +181,18 @@ def test_assembly_maps_are_transposes_of_chord_and_spins():
     wide = np.empty((12, 12))
     assembly.expand_matrix(nine, wide)
     assert x @ wide @ x == pytest.approx(chord @ nine @ chord, rel=1e-13)
+
+
+def test_series_of_the_relative_rotation_are_those_of_bernoullis_numbers():
+    """a / sin a = sum (2^2n - 2) |B_2n| a^2n / (2n)!, tan x = sum 4^n (4^n - 1) |B_2n| x^(2n - 1) / (2n)!; either side of their bounds."""
+    n = np.arange(1, 30)
+    size = np.abs(bernoulli(58)[2::2]) / factorial(2 * n)
+    chi = (2.0 ** (2 * n) - 2.0) * size / 4.0**n  # of z^(n - 1), z = 4 a^2
+    half = 4.0**n * (4.0**n - 1.0) * size / 4.0 / 4.0 ** (2 * n - 1) * 2.0  # tan(a / 2) / (4 a), x = a / 2 = sqrt(z) / 4
+    for z in (0.01, 0.0399, 0.359, 0.361, 2.0):
+        expected = [chi @ z ** (n - 1.0), (chi * (n - 1)) @ z ** (n - 2.0), (chi * (n - 1) * (n - 2)) @ z ** (n - 3.0)]
+        found = relative_rotation.chi_of(z)
+        np.testing.assert_allclose(found[:2], expected[:2], rtol=1e-11)
+        assert found[2] == pytest.approx(expected[2], rel=1e-8)  # for tangents only
+        expected = [half @ z ** (n - 1.0), (half * (n - 1)) @ z ** (n - 2.0)]
+        np.testing.assert_allclose(relative_rotation.half_spin(z), expected, rtol=1e-11)

@@ -12,7 +12,7 @@ from pipe_fmu import Pipe
 from pipe_fmu.element import frame
 from pipe_fmu.line import Water
 from pipe_fmu.loads import add_drag
-from pipe_fmu.relaxation import DESCENTS, TOLERANCE, _downward, _step, descend, newton
+from pipe_fmu.relaxation import DESCENTS, TOLERANCE, _downward, _step, descend, newton, relax
 from pipe_fmu.static_balance import Balance, Factors, Scales, _largest_eigenvalues, limited, moved
 from pipe_fmu.static_drag import add_static_drag
 
@@ -207,6 +207,21 @@ def test_a_step_of_descent_in_a_current_releases_what_it_promises():
         assert after.size < 0.1 * balance.size
         balance = after
     assert balance.size < TOLERANCE
+    assert newton(at_rest(0.1)).balance.size < TOLERANCE
+
+
+def test_a_descent_ends_where_the_line_comes_back_though_its_tangent_is_not_definite():
+    balance = newton(at_rest(0.1)).balance
+    balance.tangent[0][:, 1:3, 1:3] += np.array([[0.0, 20.0], [0.0, 0.0]]) * balance.scales.metric[:, :1, None]
+    found = descend(balance, 5)
+    assert found.stable
+    assert found.iterations == 0
+
+
+def test_an_equilibrium_that_is_not_stable_is_left_for_one_that_is():
+    found = relax(column(1e-3)[0], DESCENTS)
+    assert found.stable
+    assert np.abs(found.balance.pose[0][:, 0]).max() > 0.01
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -223,7 +238,7 @@ def test_the_way_down_is_the_softest_mode_and_not_uphill(side, ends):
     mode = _downward(balance, Factors(balance, -1.05 * values[0]), 0.1)
     assert np.abs(mode[:, 3:]).max() == pytest.approx(0.1)
     assert (mode * balance.residual).sum() < 0.0
-    np.testing.assert_allclose(mode, -side * softest * (0.1 / np.abs(softest[:, 3:]).max()), atol=2e-2 * np.abs(mode).max())
+    np.testing.assert_allclose(mode, -side * softest * (0.1 / np.abs(softest[:, 3:]).max()), atol=1e-6 * np.abs(mode).max())
     assert not mode[0, :3].any()
     assert not mode[-1, :3].any()
 
