@@ -1,4 +1,6 @@
-"""What a step does in the elements: internal forces and weight, drag, the bed, and the tangent of them all; see step_kernel.py."""
+"""What a step does in the elements: internal forces, eqs. (20)-(23) in element.py's strains, weight (28), drag (29)-(31), the bed, and the
+tangent of them all. See step_kernel.py.
+"""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Newton's method for one step."""
+"""Newton's method for the equations of one step, which step_kernel.py makes, with the ends held as ends.py says."""
 
 import math
 

@@ -1,4 +1,6 @@
-"""What a step does at the nodes: inertia of lumped mass and section, rotational damping, added mass; and the state after it."""
+"""What a step does at the nodes: inertia of lumped mass and section, eqs. (25)-(27), rotational damping (32) in the material frame, added
+mass by Kirchhoff's equations; and the state after it. See step_kernel.py.
+"""
 
 import math
 
@@ -19,7 +21,7 @@ from .so3 import (
 )
 from .static_kernel import attitude, vector_of
 
-DRAG, CURRENT, SPIN, INTERNAL, CONTACT, NUMERICAL = range(6)  # works over the step, in this order
+DRAG, CURRENT, SPIN, INTERNAL, CONTACT, NUMERICAL = range(6)  # works over the step, in the order of state.WORKS
 PATH = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15), 1.0)  # of a step: three Gauss points and the end,
 MIDDLE, END = 1, 3  # of which two are named
 

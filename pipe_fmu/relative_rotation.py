@@ -5,8 +5,8 @@ With theta_1, theta_2 the spatial spins of the ends, beta their mean and mu = th
     delta psi = A^-1 mu,   A^-1 = rho I - chi psi psi^T,   rho = a / sin a,   chi = (rho - 1) / |psi|^2,   a = |psi| / 2,
     beta_m = beta - b psi x mu,   b = tan(a / 2) / (4 a),
 
-beta_m the spin of the frame half way. Functions of an angle are taken from its square z: by their power series up to a bound below which
-what is left out is round-off, else in closed form.
+beta_m the spin of the frame half way. Functions of an angle are taken from its square z: by their power series up to a bound, else in
+closed form. Either way they and their first derivatives are good to 1e-11, the second, which only tangents take, to 1e-8.
 """
 
 import math
