@@ -1,9 +1,9 @@
 """Geometrically exact submerged pipe as a co-simulation unit.
 
 `Pipe` computes, `PipeUnit` names the ports. Modules, from the facade down:
-slave, pipe, model (mesh, catenary), statics (relaxation, static_balance, stability), integrator (newton,
-step_kernel, node_kernel, static_kernel), loads (static_drag, hydrodynamics, seabed), recovery, energy, element, assembly,
-block_tridiagonal, so3.
+slave (substeps), pipe, model (mesh, catenary), recovery, energy, statics (relaxation, static_balance, stability, static_kernel,
+static_drag), integrator (newton, step_kernel, element_kernel, node_kernel), ends, loads (hydrodynamics, seabed), element
+(geometric_stiffness, relative_rotation), assembly, block_tridiagonal, so3, and the lanes they work in (columns, lane_arrays, lanes).
 """
 
 from .model import resolve

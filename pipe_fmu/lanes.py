@@ -2,8 +2,8 @@
 
 `Lanes` is a numba type of WIDTH doubles with the arithmetic of a number, so that a formula of `so3` or `element` takes either.
 
-`below` asks whether all lanes are below a bound (for a series), `above` is 1 in the lanes above it and 0 elsewhere, `lane_by_lane` takes a
-function to the lanes that no series will do for, `total` and `largest` reduce lanes to a number. All of them take plain numbers too. How
+`below` asks whether all lanes are below a bound (for a series), `lane_by_lane` takes a function to the lanes that no series will do for;
+both take plain numbers too. `above` is 1 in the lanes above a bound and 0 elsewhere, `total` and `largest` reduce lanes to a number. How
 lanes are read from arrays and written: lane_arrays.py.
 """
 
@@ -166,23 +166,20 @@ def below(a, bound):
 
 
 def above(a, bound):
-    """1 where a number, or a lane, is above a bound (number), 0 elsewhere."""
+    """1 in the lanes above a bound (number), 0 elsewhere."""
     raise NotImplementedError("in kernels only")
 
 
 def _reduction(function: Any, fold: Any) -> None:
     @overload(function)
     def _reduce(a):
-        if a != lanes:
-            return lambda a: a
-
         def folded(a):
             out = _lane(a, 0)
             for k in range(1, WIDTH):
                 out = fold(out, _lane(a, k))
             return out
 
-        return folded
+        return folded if a == lanes else None
 
 
 @register_jitable
@@ -191,12 +188,13 @@ def _sum(a, b):
 
 
 @register_jitable
-def _larger(a, b):
+def larger(a, b):
+    """The larger of two numbers; NaN if one is."""
     return a if a >= b or a != a else b
 
 
 _reduction(total, _sum)
-_reduction(largest, _larger)
+_reduction(largest, larger)
 
 
 @overload(below)
@@ -208,7 +206,7 @@ def _below(a, bound):
 
 @overload(above)
 def _above(a, bound):
-    return (lambda a, bound: _exceeds(a, bound)) if a == lanes else (lambda a, bound: 1.0 if a > bound else 0.0)
+    return (lambda a, bound: _exceeds(a, bound)) if a == lanes else None
 
 
 @intrinsic

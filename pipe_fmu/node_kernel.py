@@ -1,4 +1,8 @@
-"""What a step does at the nodes: inertia of lumped mass and section, rotational damping, added mass; and the state after it."""
+"""What a step does at the nodes: inertia of lumped mass and section, eqs. (25)-(27), rotational damping (32) in the material frame, added
+mass by Kirchhoff's equations; and the state after it. See step_kernel.py.
+"""
+
+import math
 
 from .compiled import inner
 from .lane_arrays import grid, group, lane, row
@@ -17,8 +21,9 @@ from .so3 import (
 )
 from .static_kernel import attitude, vector_of
 
-DRAG, CURRENT, SPIN, INTERNAL, CONTACT, NUMERICAL = range(6)  # works over the step, in this order
-_MIDDLE, _END = 1, 3  # of the path of a step
+DRAG, CURRENT, SPIN, INTERNAL, CONTACT, NUMERICAL = range(6)  # works over the step, in the order of state.WORKS
+PATH = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15), 1.0)  # of a step: three Gauss points and the end,
+MIDDLE, END = 1, 3  # of which two are named
 
 
 @inner
@@ -87,8 +92,8 @@ def _add_node(line, i, h, old, moves, turned, fresh, block, residual, works):
     tensor = grid(3, 3)
     theta = vector_of(moves, 3, i)
     r_old = matrix(attitude(quaternion, i))
-    r_mid = matrix(attitude(turned[_MIDDLE], i))
-    r_new = matrix(attitude(turned[_END], i))
+    r_mid = matrix(attitude(turned[MIDDLE], i))
+    r_new = matrix(attitude(turned[END], i))
     turn = apply_transposed(r_old, theta)
     arm, move = _mass_motion(line.offset[i], theta, r_old, vector_of(moves, 0, i))
     arm_new = scale(line.offset[i], (r_new[0][0], r_new[1][0], r_new[2][0]))
@@ -151,7 +156,7 @@ def advance(line, h, old, moves, turned, new):
         theta = vector_of(moves, 3, i)
         r_old = matrix(attitude(quaternion, i))
         turn = apply_transposed(r_old, theta)
-        now = normalize(attitude(turned[_END], i))
+        now = normalize(attitude(turned[END], i))
         _, move = _mass_motion(line.offset[i], theta, r_old, vector_of(moves, 0, i))
         for a in range(3):
             new_velocity[a, i] = 2.0 * move[a] / h - velocity[a, i]
@@ -159,7 +164,7 @@ def advance(line, h, old, moves, turned, new):
         for a in range(4):
             new_quaternion[a, i] = now[a]
         if flow.shape[1] > 0:
-            r_mid = matrix(attitude(turned[_MIDDLE], i))
+            r_mid = matrix(attitude(turned[MIDDLE], i))
             v = apply_transposed(r_mid, scale(1.0 / h, move))
             for a in range(3):
                 new_flow[a, i] = 2.0 * v[a] - flow[a, i]

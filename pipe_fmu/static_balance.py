@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from .block_tridiagonal import condense, factorize, substitute
 from .compiled import kernel
+from .ends import condense_top, hold_foot, hold_foot_residual, top_correction
 from .line import Array, Line, Water
-from .newton import condense_top, hold_foot, hold_foot_residual, top_correction
 from .so3 import exp, multiply, normalize
 from .stability import positive
 from .static_kernel import attitude, static_system
@@ -84,7 +84,8 @@ class Balance:
         It does if the symmetric part of the tangent is positive definite, however it is damped. In still water, where the tangent is
         symmetric, this is all there is to it. The drag of a current has no potential and its part of the tangent is not symmetric; where
         the symmetric part is not definite, the line, moving as if damped by the metric, still comes back if all eigenvalues of the
-        tangent have positive real parts (Lyapunov's first method). The eight nearest to zero are looked at.
+        tangent have positive real parts (Lyapunov's first method). Only the eight nearest to zero are looked at: a drag so strong that it
+        reversed a stiffness far from zero and left the softer ones alone would not be seen.
         """
         return self.definite() or (bool(self.pull.any()) and self._attracting())
 

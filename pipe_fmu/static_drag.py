@@ -5,15 +5,16 @@ The force at a point is that of `loads.add_drag` at zero velocity; it reaches th
     F_1 = y f - g bow x f,   M_1 = -g f x d + g/2 bow x (f x d),   F_2 = x f + g bow x f,   M_2 = g f x d + g/2 bow x (f x d),
 
 y = 1 - x, g = x y / 2, bow = R_m psi, all in e. The tangent is its derivative along the twelve nodal unknowns one by one: with the nodes'
-mean spin beta and spin difference mu, d(bow) = beta_m x bow + A^-1 mu and beta_m = beta - b bow x mu (element.py). It has no potential.
+mean spin beta and spin difference mu, d(bow) = beta_m x bow + A^-1 mu and beta_m = beta - b bow x mu (relative_rotation.py). It has no
+potential.
 """
 
 import math
 
 from .compiled import inner
-from .element import mid_spin, relative_turn
 from .hydrodynamics import current_at, current_slope, drag
 from .loads import DRAG_POINTS
+from .relative_rotation import mid_spin, relative_turn
 from .so3 import add, cross, dot, scale
 
 

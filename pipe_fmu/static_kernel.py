@@ -4,7 +4,8 @@ import numpy as np
 
 from .assembly import add_matrix, add_vector, clear, expand, expand_matrix
 from .compiled import inner, kernel
-from .element import ROWS, STRAINS, frame, geometric_stiffness, gradients, strains
+from .element import ROWS, STRAINS, frame, gradients, strains
+from .geometric_stiffness import geometric_stiffness
 from .loads import add_press, add_press_stiffness, press
 from .static_drag import add_static_drag
 

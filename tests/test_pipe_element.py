@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from pipe_helpers import rotation, rotation_vector_quaternion, times
 from scipy.linalg import expm
+from scipy.special import bernoulli, factorial
 
-from pipe_fmu import assembly, element
+from pipe_fmu import assembly, element, geometric_stiffness, relative_rotation
 from pipe_fmu.line import shear_stiffness
 
 LENGTH = 7.0
@@ -78,7 +79,7 @@ def test_geometric_stiffness_is_the_derivative_of_the_gradients(bend, share):
     at = pose(bend)
     stress = np.array([3.0, -1.2, 0.7, 2.1, -0.8, 1.7, 0.9])
     got = np.empty((9, 9))
-    element.geometric_stiffness(*element.frame(*(tuple(x) for x in at)), LENGTH, share, stress, got)
+    geometric_stiffness.geometric_stiffness(*element.frame(*(tuple(x) for x in at)), LENGTH, share, stress, got)
     expected = central(lambda motion: stress @ gradients(*moved(*at, motion), share))
     np.testing.assert_allclose(got, expected, atol=2e-8 * np.abs(expected).max())  # step^2 and 1e-15 / step
 
@@ -180,3 +181,18 @@ def test_assembly_maps_are_transposes_of_chord_and_spins():
     wide = np.empty((12, 12))
     assembly.expand_matrix(nine, wide)
     assert x @ wide @ x == pytest.approx(chord @ nine @ chord, rel=1e-13)
+
+
+def test_series_of_the_relative_rotation_are_those_of_bernoullis_numbers():
+    """a / sin a = sum (2^2n - 2) |B_2n| a^2n / (2n)!, tan x = sum 4^n (4^n - 1) |B_2n| x^(2n - 1) / (2n)!; either side of their bounds."""
+    n = np.arange(1, 30)
+    size = np.abs(bernoulli(58)[2::2]) / factorial(2 * n)
+    chi = (2.0 ** (2 * n) - 2.0) * size / 4.0**n  # of z^(n - 1), z = 4 a^2
+    half = 4.0**n * (4.0**n - 1.0) * size / 4.0 / 4.0 ** (2 * n - 1) * 2.0  # tan(a / 2) / (4 a), x = a / 2 = sqrt(z) / 4
+    for z in (0.01, 0.0399, 0.359, 0.361, 2.0):
+        expected = [chi @ z ** (n - 1.0), (chi * (n - 1)) @ z ** (n - 2.0), (chi * (n - 1) * (n - 2)) @ z ** (n - 3.0)]
+        found = relative_rotation.chi_of(z)
+        np.testing.assert_allclose(found[:2], expected[:2], rtol=1e-11)
+        assert found[2] == pytest.approx(expected[2], rel=1e-8)  # for tangents only
+        expected = [half @ z ** (n - 1.0), (half * (n - 1)) @ z ** (n - 2.0)]
+        np.testing.assert_allclose(relative_rotation.half_spin(z), expected, rtol=1e-11)

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipe_helpers import P16, bar, started, straight
+from pipe_helpers import P16, assembled, bar, rotation, started, straight
+from scipy.interpolate import CubicHermiteSpline
 
-from pipe_fmu import PipeParameters, block_tridiagonal, newton, recovery
+from pipe_fmu import PipeParameters, block_tridiagonal, ends, newton, recovery, stability
 from pipe_fmu.environment import Environment
 from pipe_fmu.line import Water
 
@@ -37,8 +38,8 @@ def test_tangent_of_the_held_foot_is_the_derivative_of_its_residual(clamped):
     diagonal, upper, x = random.normal(size=(3, 6, 6)), random.normal(size=(2, 6, 6)), random.normal(size=(3, 6))
     residual = np.zeros((3, 6))
     residual[0] = diagonal[0] @ x[0] + upper[0] @ x[1]
-    newton.hold_foot(line, quaternion, diagonal, upper)
-    newton.hold_foot_residual(line, quaternion, tuple(x[0, 3:]), residual)
+    ends.hold_foot(line, quaternion, diagonal, upper)
+    ends.hold_foot_residual(line, quaternion, tuple(x[0, 3:]), residual)
     held = 6 if clamped else 3
     np.testing.assert_allclose((diagonal[0] @ x[0] + upper[0] @ x[1])[held:], residual[0, held:], rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(diagonal[0, :held], np.eye(6)[:held])
@@ -74,3 +75,46 @@ def test_the_wall_at_a_node_is_that_of_the_section_below_it():
     wall = recovery.wall(parameters, np.array([0.0, 250.0, 500.0, 501.0, 1200.0]))
     thin, thick = (section.steel_area for section in sections)
     np.testing.assert_allclose(wall.area, [thin, thin, thin, thick, thick], rtol=1e-12)
+
+
+@pytest.mark.parametrize("clamped", [True, False])
+def test_a_tangent_is_definite_down_to_its_lowest_eigenvalue_on_the_free_motions(clamped):
+    """Any blocks, not symmetric, on either side of the limit; free motions by projection, eigenvalues by LAPACK."""
+    _, line = bar(10.0, 4, axial=1e5, shear=1e5, torsion=80.0, bending=100.0, foot_clamped=clamped, top_clamped=clamped)
+    random = np.random.default_rng(4)
+    quaternion = np.tile(np.array([0.8, 0.2, -0.4, 0.4]), (4, 1))
+    diagonal, lower, upper = random.normal(size=(4, 6, 6)), random.normal(size=(3, 6, 6)), random.normal(size=(3, 6, 6))
+    free = np.eye(24)[:, 6:18]
+    if not clamped:
+        axis = rotation(quaternion[0])[:, 0]
+        across = np.zeros((24, 2))
+        across[3:6] = np.linalg.svd(axis[None])[2][1:].T
+        free = np.hstack([across, free, np.eye(24)[:, 21:]])
+    whole = assembled(diagonal, lower, upper)
+    lowest = np.linalg.eigvalsh(free.T @ (0.5 * (whole + whole.T)) @ free)[0]
+    for beyond in (1e-6, -1e-6):
+        assert stability.positive(line, quaternion, (diagonal, lower, upper), np.full((4, 6), beyond - lowest)) == (beyond > 0.0)
+
+
+def test_size_of_a_residual_counts_forces_and_moments_where_free_and_shows_what_is_no_number():
+    residual = np.zeros((3, 6))
+    residual[1, 2], residual[1, 4], residual[2, 0], residual[2, 5] = -4.0, 30.0, 70.0, -90.0
+    assert newton._size(residual, 2.0, 10.0, True) == 3.0
+    assert newton._size(residual, 2.0, 10.0, False) == 9.0
+    assert newton._size(residual, 0.5, 10.0, True) == 8.0
+    residual[0, 1] = np.nan
+    assert np.isnan(newton._size(residual, 2.0, 10.0, True))
+    assert np.isnan(newton._size(residual, 2.0, 10.0, False))
+
+
+def test_largest_bending_moment_is_that_between_the_nodes_too():
+    """m_2' = n_3, m_3' = -n_2: |m|^2 by Hermite's cubic of its values and slopes, here against scipy's, on steps of a sixteenth."""
+    s = np.array([0.0, 4.0, 10.0])
+    moment, shear = np.array([[9.0, 2.0, 1.0], [9.0, 1.0, -3.0], [9.0, -1.0, 0.5]]), np.array([[-0.3, 0.8], [0.4, -4.5], [0.2, 0.6]])
+    forces = recovery.SectionForces(np.zeros(3), shear, moment)
+    square = (moment[:, 1:] ** 2).sum(axis=1)
+    slope = 2.0 * (moment[:, 1] * shear[:, 1] - moment[:, 2] * shear[:, 0])
+    at = np.concatenate([np.linspace(0.0, 4.0, 17), np.linspace(4.0, 10.0, 17)])
+    expected = np.sqrt(CubicHermiteSpline(s, square, slope)(at).max())
+    assert expected > 1.05 * np.sqrt(square.max())
+    assert recovery.largest_bending_moment(s, forces) == pytest.approx(expected, rel=1e-12)

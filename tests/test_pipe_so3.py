@@ -115,6 +115,18 @@ def test_elimination_and_substitution_solve_the_dense_system_for_every_right_han
         np.testing.assert_allclose(x, expected, rtol=1e-11)  # condition of the blocks
 
 
+def test_elimination_keeps_its_digits_where_a_pivot_is_next_to_nothing(blocks):
+    """1e-13 in columns of numbers about 1, whose last is zero: taken as a pivot it would cost all but three digits."""
+    diagonal, lower, upper, right = blocks
+    diagonal[:, 0, 0], diagonal[:, 5, 0] = 1e-13, 0.0
+    expected = np.linalg.solve(assembled(diagonal, lower, upper), -right.ravel()).reshape(-1, 6)
+    x = np.empty_like(right)
+    assert factorized(blocks)
+    block_tridiagonal.condense(lower, right)
+    block_tridiagonal.substitute(diagonal, upper, right, np.linalg.solve(diagonal[-1], -right[-1]), x)
+    np.testing.assert_allclose(x, expected, rtol=1e-9)
+
+
 def test_what_is_left_at_the_top_is_the_schur_complement(blocks):
     diagonal, lower, upper, _ = blocks
     whole = assembled(diagonal, lower, upper)

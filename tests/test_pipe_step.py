@@ -213,6 +213,69 @@ def test_tangent_of_the_step_is_the_derivative_of_its_residual(name):
             np.testing.assert_allclose(a, b, atol=1e-3 * np.abs(b).max())
 
 
+def still_bar(n, **changes):
+    """(line, state of rest) of a bar without mass, straight along e1."""
+    s, line = bar(12.0 * (n - 1), n, axial=5e6, shear=1e6, torsion=1e4, bending=2e4, **changes)
+    line = line._replace(mass=0.0 * line.mass, inertia=0.0 * line.inertia)
+    return line, (*straight(s), np.zeros((n, 3)), np.zeros((n, 3)))
+
+
+def test_a_bar_spun_about_its_own_axis_feels_nothing():
+    """Its ends move alike and do not turn against each other: there is no way to close the path integral along, and none is needed."""
+    line, old = still_bar(3)
+    x = np.zeros((3, 6))
+    x[:, 3] = 0.4
+    residual, *_ = step_system(line, old, x, 1.0)
+    np.testing.assert_allclose(residual, 0.0, atol=1e-9)
+
+
+def test_what_an_element_feels_does_not_depend_on_how_others_turn():
+    """Nodes that hardly move, computed side by side with one that turns by half a radian."""
+    line, old = still_bar(6)
+    x = 1e-9 * np.random.default_rng(5).normal(size=(6, 6))
+    alone = step_system(line, old, x, 1.0)[0].reshape(6, 6)
+    x[5, 4] = 0.5
+    beside = step_system(line, old, x, 1.0)[0].reshape(6, 6)
+    assert np.abs(alone[:4]).max() > 1e-4
+    np.testing.assert_array_equal(beside[:4], alone[:4])
+
+
+def test_a_step_is_measured_by_the_largest_force_and_moment_at_an_end_of_an_element():
+    """A bar stretched by 1e-3 and a bar bent to curvature kappa: mean of before and after, EA e / 2 and EI kappa / 2."""
+    line, old = still_bar(3)
+    scales = []
+    for stretched, kappa in ((1e-3, 0.0), (0.0, 1e-4)):
+        x = np.zeros((3, 6))
+        x[:, 0] = stretched * old[0][:, 0]
+        x[:, 2], x[:, 4] = -0.5 * kappa * old[0][:, 0] ** 2, kappa * old[0][:, 0]
+        system = np.empty((3, 6, 6)), np.empty((2, 6, 6)), np.empty((2, 6, 6)), np.empty((3, 6))
+        state = *old, np.zeros((0, 3)), np.zeros((2, 7))
+        scales.append(step_kernel.step_system(line, STILL, 1.0, *state, x, np.empty((2, 7)), True, True, system, np.empty(6)))
+    assert scales[0] == pytest.approx((0.5 * 5e6 * 1e-3, 0.0), rel=1e-6, abs=1e-6)
+    assert scales[1][1] == pytest.approx(0.5 * 2e4 * 1e-4, rel=5e-3)
+
+
+def test_tangent_of_a_step_is_exact_for_any_turn_where_no_force_acts():
+    """A bar turned by 0.4 rad as a whole, at the velocities at which its masses, ahead of the nodes, neither slow nor speed up."""
+    s, line = bar(24.0, 3, axial=5e6, shear=1e6, torsion=1e4, bending=2e4, mass=2.0)
+    line = line._replace(offset=np.array([0.5, -0.3, 0.2]), inertia=0.0 * line.inertia, damping=np.full(2, 0.1))
+    position, attitude = straight(s)
+    theta, h, n = np.array([0.2, -0.3, 0.17]), 0.1, 3
+    turn = rotation(rotation_vector_quaternion(theta))
+    x = np.hstack([position @ turn.T - position, np.tile(theta, (n, 1))])
+    moved = (position + line.offset[:, None] * [1.0, 0.0, 0.0]) @ (turn.T - np.eye(3))
+    old = position, attitude, moved / h, np.zeros((n, 3))
+    residual, tangent, *_ = step_system(line, old, x, h)
+    got = np.empty_like(tangent)
+    for k in range(6 * n):
+        d = np.zeros(6 * n)
+        d[k] = 1e-6
+        up, down = (step_system(line, old, x + sign * d.reshape(n, 6), h)[0] for sign in (1, -1))
+        got[:, k] = (up - down) / 2e-6
+    assert np.abs(residual).max() < 1e-6
+    np.testing.assert_allclose(tangent, got, rtol=1e-6, atol=1e-8 * np.abs(got).max())
+
+
 @pytest.mark.parametrize("name", ["current", "pinned-top", "added-mass"])
 def test_impedance_is_the_difference_of_top_forces_by_top_velocities(name):
     pipe, _, start = started(scene(name))
@@ -226,6 +289,7 @@ def test_impedance_is_the_difference_of_top_forces_by_top_velocities(name):
         slope = (up - down) / 2e-5
         np.testing.assert_allclose(impedance[:, k], slope, atol=5e-3 * np.abs(slope).max() + 1e-6 * np.abs(impedance).max())
     if name == "pinned-top":
+        assert not pipe.step(state, v, w, h).top[3:].any()
         assert not impedance[3:].any()
         assert not impedance[:, 3:].any()
     assert np.linalg.eigvalsh(impedance + impedance.T)[0] > -1e-6 * np.abs(impedance).max()  # it resists

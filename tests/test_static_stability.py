@@ -4,31 +4,36 @@ import math
 
 import numpy as np
 import pytest
-from pipe_helpers import STILL, bar, pitch, rotation, static_system, turned
+from pipe_helpers import STILL, assembled, bar, pitch, rotation, static_system, straight, turned
+from scipy.linalg import eigh
 from statics_grid import scenes
 
 from pipe_fmu import Pipe, PipeUnit
 from pipe_fmu.element import frame
+from pipe_fmu.line import Water
 from pipe_fmu.loads import add_drag
-from pipe_fmu.relaxation import DESCENTS, descend, newton
-from pipe_fmu.static_balance import Balance, Scales
+from pipe_fmu.relaxation import DESCENTS, TOLERANCE, _downward, _step, descend, newton, relax
+from pipe_fmu.static_balance import Balance, Factors, Scales, _largest_eigenvalues, limited, moved
 from pipe_fmu.static_drag import add_static_drag
 
 SCENES = scenes()
 
 
-def held_tangent(line, found, water):
-    """Tangent of the free unknowns over the root of the metric, dense, by projection; and the neutral stiffness."""
-    scales = Scales(line)
-    tangent = static_system(line, found.position, found.quaternion, water)[1]
-    size = len(tangent)
-    free = np.delete(np.eye(size), [*range(3), *range(size - 6, size - 3)], axis=1)  # both ends hold their places
-    if line.foot_clamped:
-        free = free[:, 3:]
-    else:
-        axis = rotation(found.quaternion[0])[:, 0]
-        free[3:6, :3] = np.linalg.svd(axis[None])[2].T  # the first column turns about t1
+def free_motions(line, quaternion):
+    """Columns: the motions (6 n,) that the ends leave free, by projection."""
+    size = 6 * len(quaternion)
+    held = [*range(6 if line.foot_clamped else 3), *range(size - 6, size if line.top_clamped else size - 3)]
+    free = np.delete(np.eye(size), held, axis=1)
+    if not line.foot_clamped:
+        free[3:6, :3] = np.linalg.svd(rotation(quaternion[0])[:, :1].T)[2].T  # the first column turns about t1
         free = free[:, 1:]
+    return free
+
+
+def held_tangent(line, found, water):
+    """Tangent of the free unknowns over the root of the metric, dense; and the neutral stiffness."""
+    scales, free = Scales(line), free_motions(line, found.quaternion)
+    tangent = static_system(line, found.position, found.quaternion, water)[1]
     root = 1.0 / np.sqrt((free.T @ (scales.metric.ravel()[:, None] * free)).diagonal())
     return root[:, None] * (free.T @ tangent @ free) * root, scales.neutral
 
@@ -91,10 +96,14 @@ def test_drag_at_rest_is_that_of_a_step_without_motion_and_its_tangent_is_its_de
         np.testing.assert_allclose(matrix[:, k], expected, rtol=1e-6, atol=1e-4)
 
 
-def column(shortened):
-    """Balance of a straight standing column, clamped below and pinned above, pressed in by a share of its length; EI, L."""
+def column(shortened, out_of_plane=1.0):
+    """Balance of a straight standing column, clamped below and pinned above, pressed in by a share of its length; EI, L.
+
+    out_of_plane: the bending stiffness there, over that in the x-z plane.
+    """
     length, bending = 10.0, 1e4
-    s, line = bar(length, 33, axial=1e7, shear=1e7, torsion=1e4, bending=bending, weight=1.0, foot_clamped=True, top_clamped=False)
+    stiffness = {"axial": 1e7, "shear": 1e7, "torsion": 1e4, "bending": bending, "bending_3": out_of_plane * bending}
+    s, line = bar(length, 33, **stiffness, weight=1.0, foot_clamped=True, top_clamped=False)
     position = np.outer(s * (1.0 - shortened), [0.0, 0.0, -1.0])
     return Balance(line, STILL, Scales(line), (position, np.tile(pitch(0.5 * math.pi), (33, 1)))), bending, length
 
@@ -128,3 +137,160 @@ def test_a_unit_that_starts_in_an_equilibrium_that_is_not_stable_says_so(monkeyp
     monkeypatch.setattr(Pipe, "start", lambda self, time: (found[0]._replace(stable=False), found[1]))
     assert unit.initialize(0.0, {}) is None
     assert "not stable" in unit.remark
+
+
+def at_rest(current, **changes):
+    """Balance of a taut line in a current [m/s] across it, at the equilibrium in still water; it is at rest without one."""
+    _, line = bar(20.0, 6, axial=1e5, shear=1e5, torsion=1e5, bending=100.0, weight=5.0, drag=np.full((5, 2), 40.0), **changes)
+    position, quaternion = straight(np.linspace(0.0, 20.2, 6), (0.8, 0.0, -0.6), pitch(math.asin(0.6)))
+    still = newton(Balance(line, STILL, Scales(line), (position, quaternion))).balance
+    water = Water(np.array([-30.0, 0.0]), np.array([[0.0, current, 0.0], [0.1, 0.3 * current, 0.0]]), True)
+    return Balance(line, water, Scales(line), still.pose) if current else still
+
+
+def dense(balance):
+    """(tangent over the metric, projected on the free motions, these motions): what pushes back against them."""
+    free = free_motions(balance.line, balance.pose[1])
+    return free.T @ assembled(*balance.tangent) @ free, free.T @ (balance.scales.metric.ravel()[:, None] * free), free
+
+
+@pytest.mark.parametrize(
+    ("block", "stable"),
+    [
+        ([[0.0, 0.0], [0.0, 0.0]], True),
+        ([[0.0, 20.0], [0.0, 0.0]], True),  # pushes across what it feels: the symmetric part is not definite
+        ([[4.0, 20.0], [-20.0, 4.0]], True),
+        ([[-8.0, 0.0], [0.0, 0.0]], False),
+        ([[-8.0, 20.0], [-20.0, -8.0]], False),  # pushes away in circles
+        ([[0.0, 20.0], [20.0, 0.0]], False),
+    ],
+)
+@pytest.mark.parametrize("ends", [{}, {"foot_clamped": False, "top_clamped": False}])
+def test_a_line_is_stable_if_all_eigenvalues_of_its_tangent_have_positive_real_parts(block, stable, ends):
+    """A taut line, softest at 5.4 or 1.2 1/m, with a part in its tangent as of a current, times the metric. Dense eigenvalues by LAPACK."""
+    balance = at_rest(0.8, **ends)
+    balance.tangent[0][:, 1:3, 1:3] += np.array(block) * balance.scales.metric[:, :1, None]
+    stiffness, metric, _ = dense(balance)
+    eigenvalues = np.linalg.eigvals(np.linalg.solve(metric, stiffness))
+    assert (eigenvalues.real.min() > 0.0) == stable
+    assert balance.stable() == stable
+    assert balance.definite() == (np.linalg.eigvalsh(stiffness + stiffness.T)[0] > 0.0)
+
+
+@pytest.mark.parametrize("size", [30, 200])
+def test_arnoldis_method_finds_the_largest_eigenvalues(size):
+    """Of a matrix that is not symmetric, with pairs, well apart; in fewer steps than its size or as many."""
+    random = np.random.default_rng(size)
+    values = np.sort(random.uniform(0.0, 0.5, size))
+    values[-8:] = [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]
+    matrix = np.diag(values)
+    matrix[-2:, -2:] = [[8.0, 5.0], [-5.0, 8.0]]
+    basis = random.normal(size=(size, size)) + 3.0 * np.eye(size)
+    matrix = basis @ matrix @ np.linalg.inv(basis)
+    found = _largest_eigenvalues(lambda x: matrix @ x, np.ones(size))
+    expected = np.array([8.0 + 5.0j, 8.0 - 5.0j, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0])
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), rtol=1e-9)
+
+
+def test_arnoldis_method_ends_where_its_vectors_do():
+    """A start within four eigenvectors: four values, and no division by what is left of a fifth vector."""
+    found = _largest_eigenvalues(lambda x: np.arange(1.0, 41.0) * x, np.append(np.ones(4), np.zeros(36)))
+    np.testing.assert_allclose(np.sort(found.real), [1.0, 2.0, 3.0, 4.0], rtol=1e-12)
+
+
+def test_energy_promised_by_a_move_is_that_released_to_third_order():
+    balance = at_rest(0.0)
+    move = np.random.default_rng(2).normal(size=balance.residual.shape) * [0.02, 0.02, 0.02, 0.005, 0.005, 0.005]
+    move[0] = move[-1] = 0.0
+    left = [balance.potential - balance.after(k * move).potential - balance.promise(k * move) for k in (1.0, 0.5)]
+    assert left[0] / left[1] == pytest.approx(8.0, rel=0.2)
+    assert abs(left[0]) < 0.1 * abs(balance.promise(move))
+
+
+def test_a_step_of_descent_in_a_current_releases_what_it_promises():
+    """To third order, the work of the drag counted in; and near the end too, where only the forces tell."""
+    balance = at_rest(0.1)
+    for _ in range(3):
+        after, ratio = _step(balance, 0.0, 0.25, True)
+        assert ratio == pytest.approx(1.0, abs=5e-3)
+        assert after.size < 0.1 * balance.size
+        balance = after
+    assert balance.size < TOLERANCE
+    assert newton(at_rest(0.1)).balance.size < TOLERANCE
+
+
+def test_a_descent_ends_where_the_line_comes_back_though_its_tangent_is_not_definite():
+    balance = newton(at_rest(0.1)).balance
+    balance.tangent[0][:, 1:3, 1:3] += np.array([[0.0, 20.0], [0.0, 0.0]]) * balance.scales.metric[:, :1, None]
+    found = descend(balance, 5)
+    assert found.stable
+    assert found.iterations == 0
+
+
+def test_an_equilibrium_that_is_not_stable_is_left_for_one_that_is():
+    found = relax(column(1e-3)[0], DESCENTS)
+    assert found.stable
+    assert np.abs(found.balance.pose[0][:, 0]).max() > 0.01
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("ends", [{}, {"foot_clamped": False, "top_clamped": False}])
+def test_the_way_down_is_the_softest_mode_and_not_uphill(side, ends):
+    """Lowest eigenvector of the tangent by the metric (scipy), its largest turn as told, against the residual; held ends stay."""
+    balance = at_rest(0.0, **ends)
+    balance.tangent[0][3] -= 2.0 * np.diag([0.0, balance.tangent[0][3][1, 1] / 3.0, 0.0, 0.0, 0.0, 0.0])
+    stiffness, metric, free = dense(balance)
+    values, vectors = eigh(0.5 * (stiffness + stiffness.T), metric)
+    assert values[0] < 0.0 < values[1]
+    softest = (free @ vectors[:, 0]).reshape(-1, 6)
+    balance.residual[:] = side * balance.scales.metric * softest
+    mode = _downward(balance, Factors(balance, -1.05 * values[0]), 0.1)
+    assert np.abs(mode[:, 3:]).max() == pytest.approx(0.1)
+    assert (mode * balance.residual).sum() < 0.0
+    np.testing.assert_allclose(mode, -side * softest * (0.1 / np.abs(softest[:, 3:]).max()), atol=1e-6 * np.abs(mode).max())
+    assert not mode[0, :3].any()
+    assert not mode[-1, :3].any()
+
+
+def test_a_column_leaves_a_saddle_by_a_way_that_no_residual_shows():
+    """Softer out of its plane, where nothing pushes it, not even round-off: only the direction of negative curvature leads there."""
+    straight, *_ = column(1.5e-3, 0.5)
+    rest = newton(straight)
+    assert not rest.stable
+    assert not rest.balance.pose[0][:, 1].any()
+    found = descend(rest.balance, DESCENTS)
+    assert found.stable
+    assert np.abs(found.balance.pose[0][:, 1]).max() > 0.01
+
+
+def test_a_limited_move_turns_no_section_by_more_and_keeps_its_direction():
+    move = np.random.default_rng(1).normal(size=(4, 6))
+    largest = np.abs(move[:, 3:]).max()
+    np.testing.assert_array_equal(limited(move, 1.01 * largest), move)
+    np.testing.assert_allclose(limited(move, 0.1), move * 0.1 / largest, rtol=1e-14)
+
+
+def test_a_line_is_measured_by_its_weight():
+    """Forces by all of it, moments by that times the longest element; a node by its share W, turning by W l^2 / 12."""
+    _, line = bar(9.0, 3, axial=1e5, shear=1e5, torsion=80.0, bending=100.0)
+    scales = Scales(line._replace(weight=np.array([2.0, -4.0]), length=np.array([3.0, 6.0])))
+    np.testing.assert_allclose(scales.force, [30.0] * 3 + [180.0] * 3)
+    share, own = np.array([3.0, 15.0, 12.0]), np.array([1.5, 4.5, 3.0])
+    np.testing.assert_allclose(scales.metric[:, 0], share)
+    np.testing.assert_allclose(scales.metric[:, 4], share * own**2 / 12.0)
+
+
+def test_attitudes_stay_of_unit_length():
+    balance = at_rest(0.0)
+    _, attitude = moved((balance.pose[0], 1.001 * balance.pose[1]), np.full(balance.residual.shape, 0.1))
+    np.testing.assert_allclose(np.linalg.norm(attitude, axis=1), 1.0, rtol=1e-15)
+
+
+def test_forces_on_held_ends_are_struck():
+    for clamped in (True, False):
+        balance = at_rest(0.5, top_clamped=clamped)
+        forces = np.ones(balance.residual.shape)
+        balance.hold(forces)
+        np.testing.assert_array_equal(forces[-1], [0.0] * 6 if clamped else [0.0] * 3 + [1.0] * 3)
+        assert not forces[0].any()
+        assert forces[1:-1].all()

@@ -1,0 +1,187 @@
+"""What a step does in the elements: internal forces, eqs. (20)-(23) in element.py's strains, weight (28), drag (29)-(31), the bed, and the
+tangent of them all. See step_kernel.py.
+"""
+
+import math
+
+from .assembly import add_matrix, add_vector, expand, expand_matrix
+from .compiled import inner
+from .element import ROWS, STRAINS, frame, gradients, resultant, strains
+from .geometric_stiffness import geometric_stiffness
+from .lane_arrays import grid, group, lane, row
+from .lanes import above, below
+from .loads import add_drag, add_mean_contact, bed_on_sag
+from .node_kernel import CONTACT, CURRENT, DRAG, END, INTERNAL, MIDDLE, NUMERICAL, PATH, turn_columns
+from .so3 import add, dot, left_jacobian, scale
+from .static_kernel import attitude, chord, vector_of
+
+_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)  # of the Gauss points of the path
+_CLOSURE_ANGLE = 0.02  # rad per step; below it three Gauss points are exact to round-off
+_NO_MOTION = 1e-300  # square of a motion
+
+
+@inner
+def add_elements(line, water, first, count, h, old, new, fresh, sharp, system, sums, peaks):
+    """Add what the `count` elements from `first` on do; arrays as in step_kernel.assemble, works into `sums` (6,), the largest force and
+    moment at an end of an element into `peaks` (2,).
+    """
+    position, strain = old[0], old[5]
+    moves, turned, new_strain = new
+    a, b = group(first), group(first + 1)
+    length, share = line.length[a], (line.share[0, a], line.share[1, a])
+    lies = line.bed.shape[0] > 0
+    d, dd = chord(position, a, b), chord(moves, a, b)
+    mean, final, stress, nine, vector = grid(7, 9), grid(7, 9), row(7), row(9), row(12)
+    square, twelve, ends, drags = grid(9, 9), grid(12, 12), grid(2, 6), (grid(3, 12), grid(3, 12))
+    rm, u, psi = frame(attitude(turned[END], a), attitude(turned[END], b), add(d, dd))
+    strains(rm, u, psi, length, share, stress)
+    for k in range(ROWS):
+        new_strain[k, a] = stress[k]
+    if fresh:
+        gradients(rm, u, psi, length, share, final)
+    ahead = _stress(line, h, a, strain, new_strain, stress, sums)
+    _mean_force(a, b, length, share, d, moves, turned, strain, new_strain, fresh or lies, stress, mean, nine)
+    expand(nine, vector)
+    for i in range(3):
+        peaks[0] = max(peaks[0], math.fabs(vector[i]))
+        peaks[1] = max(peaks[1], math.fabs(vector[3 + i]))
+    weight = length * line.weight[a]
+    vector[2] -= 0.5 * weight
+    vector[8] -= 0.5 * weight
+    rm, u, psi = frame(attitude(turned[MIDDLE], a), attitude(turned[MIDDLE], b), add(d, scale(0.5, dd)))
+    if fresh:
+        if lies:
+            _press_sag(line, first, count, h, old, new, stress)
+        _tangent(line, a, (rm, u, psi), share, stress, ahead, mean, final, square)
+        expand_matrix(square, twelve)
+    for i in range(6):
+        ends[0, i], ends[1, i] = moves[i, a] / h, moves[i, b] / h
+    if water.drag:
+        depths = (position[2, a] + 0.5 * moves[2, a], position[2, b] + 0.5 * moves[2, b])
+        how = (line.drag[0, a], line.drag[1, a]), ends, depths, water.levels, water.velocities, 1.0 / h, fresh
+        dissipated, supplied = add_drag(rm, u, psi, length, *how, vector, twelve, drags)
+        sums[DRAG] += h * dissipated
+        sums[CURRENT] += h * supplied
+    if lies:
+        _add_bed(line, first, count, h, old, new, ends, mean, final, fresh, sharp, vector, twelve, drags[0], sums)
+    if fresh:
+        turn_columns(left_jacobian(vector_of(moves, 3, a)), twelve, 12, 3)
+        turn_columns(left_jacobian(vector_of(moves, 3, b)), twelve, 12, 9)
+    diagonal, lower, upper, residual = system
+    for m in range(count):
+        add_vector(residual, first + m, lane(vector, m))
+        if fresh:
+            add_matrix(diagonal, lower, upper, first + m, lane(twelve, m))
+
+
+@inner
+def _mean_force(a, b, length, share, d, moves, turned, strain, new_strain, by_row, stress, mean, nine):
+    """`stress` (7,) times the gradients averaged over the path, into `nine` (9,); these into `mean` (7, 9) if `by_row`."""
+    dd, t1, t2 = chord(moves, a, b), vector_of(moves, 3, a), vector_of(moves, 3, b)
+    turn = max(dot(t1, t1), dot(t2, t2))
+    large = not below(turn, _CLOSURE_ANGLE**2)
+    by_row = by_row or large
+    rows = grid(7, 9)
+    for i in range(9):
+        nine[i] = 0.0
+        for k in range(ROWS):
+            mean[k, i] = 0.0
+    for g in range(3):
+        rm, u, psi = frame(attitude(turned[g], a), attitude(turned[g], b), add(d, scale(PATH[g], dd)))
+        if by_row:
+            gradients(rm, u, psi, length, share, rows)
+            for k in range(ROWS):
+                for i in range(9):
+                    mean[k, i] += _WEIGHTS[g] * rows[k, i]
+        else:
+            resultant(rm, u, psi, length, share, stress, rows[0])
+            for i in range(9):
+                nine[i] += _WEIGHTS[g] * rows[0, i]
+    if large:
+        _close(mean, dd, t1, t2, length, above(turn, _CLOSURE_ANGLE**2), a, strain, new_strain)
+    if by_row:
+        for i in range(9):
+            for k in range(ROWS):
+                nine[i] += stress[k] * mean[k, i]
+
+
+@inner
+def _heights(e, old, new):
+    """(z of the two nodes and sag) of element e before and after."""
+    moves, _, new_strain = new
+    before = old[0][2, e], old[0][2, e + 1], old[5][STRAINS, e]
+    return before, (before[0] + moves[2, e], before[1] + moves[2, e + 1], new_strain[STRAINS, e])
+
+
+@inner
+def _press_sag(line, first, count, h, old, new, stress):
+    """Add the bed's part to what is conjugate to the sag, for the geometric stiffness."""
+    for m in range(count):
+        e = first + m
+        lane(stress, m)[STRAINS] += bed_on_sag(line.length[e], h, line.diameter[e], line.weight[e], line.bed[0], *_heights(e, old, new))
+
+
+@inner
+def _add_bed(line, first, count, h, old, new, ends, mean, final, fresh, sharp, vector, twelve, scratch, sums):
+    """Add the bed's reaction to `vector` (12,) and, if `fresh`, `twelve` (12, 12)."""
+    for m in range(count):
+        e = first + m
+        bed = line.length[e], h, line.diameter[e], line.weight[e], line.bed
+        sag_rows = lane(mean, m)[STRAINS], lane(final, m)[STRAINS]
+        into = lane(vector, m), lane(twelve, m), (lane(scratch, m),)
+        lane(sums, m)[CONTACT] += add_mean_contact(*bed, *_heights(e, old, new), lane(ends, m), *sag_rows, fresh, sharp, *into)
+
+
+@inner
+def _stress(line, h, a, strain, new_strain, stress, sums):
+    """Mean section forces times length into `stress` (7,), with the works of damping; returns d stress / d strain over length x stiffness
+    less a half."""
+    length = line.length[a]
+    late = line.numerical_damping
+    lag = line.damping[a] if line.damping.shape[0] > 0 else 0.0 * length
+    ahead = lag / h + late
+    for k in range(STRAINS):
+        modulus = length * line.stiffness[k, a]
+        change = new_strain[k, a] - strain[k, a]
+        stress[k] = modulus * (0.5 * (strain[k, a] + new_strain[k, a]) + ahead * change)
+        sums[INTERNAL] += modulus * lag / h * change * change
+        sums[NUMERICAL] += modulus * late * change * change
+    stress[STRAINS] = -length * line.weight[a] / 6.0
+    return ahead
+
+
+@inner
+def _tangent(line, a, middle, share, stress, ahead, mean, final, square):
+    """Derivative of the mean force: half of the geometric stiffness half way, and the stiffness of the strains at the end."""
+    rm, u, psi = middle
+    length = line.length[a]
+    geometric_stiffness(rm, u, psi, length, share, stress, square)
+    for i in range(9):
+        for j in range(9):
+            square[i, j] *= 0.5
+    for k in range(STRAINS):
+        modulus = length * line.stiffness[k, a] * (0.5 + ahead)
+        for i in range(9):
+            push = modulus * mean[k, i]
+            for j in range(9):
+                square[i, j] += push * final[k, j]
+
+
+@inner
+def _close(mean, dd, t1, t2, length, wanted, a, old, new):
+    """Make mean . motion = new - old exactly where `wanted` is 1, by the least change along the relative motion of the ends."""
+    motion, norm = row(9), 0.0 * length
+    for i in range(3):
+        motion[i] = dd[i]
+        motion[3 + i] = 0.5 * (t1[i] + t2[i])
+        motion[6 + i] = t2[i] - t1[i]
+        norm += motion[i] * motion[i] + length * length * motion[6 + i] * motion[6 + i]
+    norm = max(norm, _NO_MOTION)
+    for k in range(ROWS):
+        gap = new[k, a] - old[k, a]
+        for i in range(9):
+            gap -= mean[k, i] * motion[i]
+        gap *= wanted / norm
+        for i in range(3):
+            mean[k, i] += gap * motion[i]
+            mean[k, 6 + i] += gap * length * length * motion[6 + i]
