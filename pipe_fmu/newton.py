@@ -111,7 +111,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
     diagonal, lower, upper, residual = system
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
-    fresh, keep = True, True
+    fresh = keep = n > 0  # True, but no literal, for which numba would compile the assembly once more
     prescribed = True
     for i in range(SIZE):
         for j in range(SIZE):
