@@ -13,45 +13,47 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import pipe_fmu
-import vessel_fmu
-from master import statics
 from master.errors import RunError, UsageError
-from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu, compile_kernels
+from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
 from master.fmi.schema import to_mapping
+from master.fmi.stand_in import let_stand_in
 from master.scene import from_mapping
+
+PACKAGES: dict[str, tuple[str, dict[str, Any]]] = {
+    "pipe_fmu": ("slave.PipeUnit", {"mesh": "uniform"}),  # an adapted one takes statics
+    "vessel_fmu": ("slave.VesselUnit", {}),
+}
 
 
 def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False) -> dict[str, Any]:
     """FMU files, parameters to set and the equilibrium of a scene. Raises UsageError, RunError."""
     scene = from_mapping(mapping, "scene")
+    folders = let_stand_in(PACKAGES)
+    from master import statics  # of the packages that now stand in
+
     rest = statics.equilibrium(scene)
     at = statics.released(scene, rest)
     simulation = scene.sections.simulation
     experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
     pull = (0.0 - at.found.top).tolist()  # no -0.0 among them
     pipe = replace(at.pipe, reference_force=tuple(pull[:3]), reference_moment=tuple(pull[3:]))
-    units: dict[str, tuple[Any, str, Any]] = {"pipe": (pipe_fmu, "slave.PipeUnit", pipe)}
-    if at.vessel is not None:
-        units["vessel"] = (vessel_fmu, "slave.VesselUnit", at.vessel)
+    units: dict[str, Any] = {"pipe": pipe} | ({} if at.vessel is None else {"vessel": at.vessel})
     held = {"vessel": {"force": pull[:3], "moment": pull[3:]}}
     recipes = {
         name: Recipe(
-            Path(package.__file__).parent,
-            unit,
+            folders[f"{name}_fmu"],
+            PACKAGES[f"{name}_fmu"][0],
             to_mapping(parameters),
             experiment=experiment,
             inputs=held.get(name, {}),
             portable=portable,
         )
-        for name, (package, unit, parameters) in units.items()
+        for name, parameters in units.items()
     }
     fmus = {
         name: cached_fmu(recipe, cache_folder("fmus")) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
         for name, recipe in recipes.items()
     }
-    for name, path in fmus.items():
-        compile_kernels(recipes[name], path)
     equilibrium: dict[str, Any] = {"top_force_e_N": rest.found.top[:3].tolist(), "top_moment_e_N_m": rest.found.top[3:].tolist()}
     if at.vessel is not None:
         equilibrium |= {"hold_force": at.vessel.hold_force, "vessel": asdict(at.vessel.start)}
