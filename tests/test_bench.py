@@ -52,6 +52,14 @@ def test_a_race_compares_with_the_cheapest_of_ours_that_is_as_good_and_a_lost_on
     assert [(found, least) for _, found, least in line.verdicts("heave", rows)] == [(4.0, 3.0)]
 
 
+def test_a_step_longer_than_the_time_between_instants_is_interpolated():
+    """A curve through the ends of steps of 0.8 s against steps of 0.4 s: no worse than twice the time rule's own fourfold error."""
+    case = replace(QUICK, duration=24.0)
+    exact = line._run(case, FINE)[1]
+    short, long = (line._run(case, Setting(line.OWN, 16, h, "adapted"))[1].distance(exact) for h in (0.4, 0.8))
+    assert np.all(np.array(long) < 8.0 * np.array(short))
+
+
 def rest():
     """Positions at the quarters and top force of the line at rest, on a fine mesh of ours, which tests of statics hold against others."""
     pipe = Pipe(replace(line.PIPE, nodes=193))
