@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite, isqrt
 from typing import Any
 
 import numpy as np
@@ -103,20 +104,25 @@ class Bond:
         return [0, *np.cumsum([pair.size for pair in self.pairs])[:-1].tolist()]
 
     @cached_property
-    def _floors(self) -> Vector:
+    def floors(self) -> Vector:
+        """Flows that count as rest, one a pair."""
         return np.array([pair.floor for pair in self.pairs])
+
+    def sizes(self, vector: Vector) -> Vector:
+        """Norm of every pair's part of a vector (size,), or of every row of one (k, size)."""
+        return np.sqrt(np.add.reduceat(vector * vector, self._starts, axis=-1))
 
     def idle_power(self, effort: Vector) -> Any:
         """Sum over the pairs of |effort| x floor [W]: the power that counts as nothing; of every row (size,) of `effort`."""
-        return np.sqrt(np.add.reduceat(effort * effort, self._starts, axis=-1)) @ self._floors
+        return self.sizes(effort) @ self.floors
 
     def flow_increments(self) -> Vector:
         """Increments of the flows for difference quotients, (size,)."""
-        return np.repeat(_INCREMENT * self._floors, [pair.size for pair in self.pairs])
+        return np.repeat(_INCREMENT * self.floors, [pair.size for pair in self.pairs])
 
     def effort_increments(self, effort: Vector) -> Vector:
         """Increments of the efforts for difference quotients, (size,)."""
-        norms = np.sqrt(np.add.reduceat(effort * effort, self._starts))
+        norms = self.sizes(effort)
         norms[norms == 0.0] = 1.0 / _RELATIVE_INCREMENT
         return np.repeat(_RELATIVE_INCREMENT * norms, [pair.size for pair in self.pairs])
 
@@ -149,6 +155,7 @@ class FmuEnd:
         self._derivative = derivative if derivative in fmu.ports else None
         self.yields = yielding in fmu.ports and all(name in fmu.ports for name in met)
         self._yielding, self._met = (yielding, (*self._result, *met)) if self.yields else ("", ())
+        self._stiff = np.zeros(fmu.ports[yielding].size if self.yields else 0)
         self.rollback, self.varies = rollback and fmu.can_rollback, fmu.can_vary_step
         self._saved: ctypes.c_void_p | None = None
         self._moved = False
@@ -160,26 +167,25 @@ class FmuEnd:
 
     def solve(self, time: float, step: float, held: Vector) -> Vector:
         """Step from `time` with `held` on the ports; the conjugate ports. Raises StepRejected, FmuFailed."""
-        self._step(time, step, self._held, held)
+        if self._yielding:
+            self._step(time, step, (*self._held, self._yielding), np.concatenate([held, self._stiff]))
+        else:
+            self._step(time, step, self._held, held)
         result = self.result()
-        if not np.isfinite(result).all():
+        if not _finite(result):
             raise self._broken(time, step)
         return result
 
     def meet(self, time: float, step: float, free: Vector, mobility: Matrix) -> tuple[Vector, Vector] | None:
         """Step with a flow V that meets V = free + mobility x answer; V and answer, which belong together. None if the FMU cannot.
 
-        The next `solve` holds what it is given: the mobility is zero in the saved state that it goes back to, or set so. Raises as `solve`.
+        Raises as `solve`.
         """
         if not self._yielding:
             return None
-        try:
-            self._step(time, step, (*self._held, self._yielding), np.concatenate([free, mobility.ravel()]))
-            values = self.fmu.get(self._met)
-        finally:
-            if self._saved is None:
-                self.fmu.set(self._yielding, np.zeros(mobility.size))
-        if not np.isfinite(values).all():
+        self._step(time, step, (*self._held, self._yielding), np.concatenate([free, mobility.ravel()]))
+        values = self.fmu.get(self._met)
+        if not _finite(values):
             raise self._broken(time, step)
         return values[free.size :], self._signs * values[: free.size]
 
@@ -207,7 +213,7 @@ class FmuEnd:
         if self._derivative is None:
             return np.reshape(self._signs, (-1, 1)) * self.fmu.derivatives(self._result, self._held) if self.fmu.has_derivatives else None
         values = self.fmu.get(self._derivative)
-        return self._sign * values.reshape(-1, int(np.sqrt(values.size)))
+        return self._sign * values.reshape(-1, isqrt(values.size))
 
     def commit(self) -> None:
         """Keep the last solve."""
@@ -220,6 +226,10 @@ class FmuEnd:
         if self._saved is not None:
             self.fmu.restore(self._saved)
             self.commit()
+
+
+def _finite(values: Vector) -> bool:
+    return isfinite(values @ values) or bool(np.isfinite(values).all())  # the first is quicker, the second knows of overflow
 
 
 def _several(names: Names) -> tuple[str, ...]:

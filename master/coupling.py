@@ -12,11 +12,12 @@ what it is given. The step is accepted when the bond makes no energy. With F = -
 Z and Y follow the ends' ports, where there are such, which makes the iteration Newton's; else Z follows Broyden's update,
 and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap.
 
-An impedance end that can yield (see `master.bond.FmuEnd.meet`) takes V_free and Y and solves for V and f at once, within its own
-Newton iteration. That replaces the extrapolated pair, and is exact where the mobility end is linear; where that end answers f with
-another V, V_free and Y are taken anew at the f found. One more solve, with the V that the mobility end answers, confirms it. Without
-yielding the second round is exact where f is linear in V. Either way two solves of the impedance end make a step; without yielding
-one does where nothing happens, and more where the extrapolation fails.
+An impedance end that can yield (see `master.bond.FmuEnd.meet`) takes V_free and Y, which that end's `derivative` gives at the
+extrapolated f, and solves for V and f at once, within its own Newton iteration. Where the mobility end answers that f with the same V to
+round-off, as it does where it is nearly linear over the error of the extrapolation, the step is done, with one solve of the impedance end.
+Else V_free and Y are taken anew at the f found, and one more solve, with the V that the mobility end answers, confirms it. Without
+yielding the second round is exact where f is linear in V, and two solves make a step; one does where nothing happens, and more where the
+extrapolation fails.
 
 A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
 few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. No step is halved where
@@ -44,6 +45,7 @@ DIFFERENCES_ROUNDS = (4, 8)  # rounds after which Z is taken by differences: wit
 LAST_ROUND = 12
 FALLING = 0.3  # of the defect of the round before: more is no progress
 ROUND_OFF = 1e-10  # of the product of the magnitudes: without progress below this the ends' own round-off is reached
+SAME, STILL = 1e-12, 1e-8  # of a flow, and of one that counts as rest: what moves no pose by more than its own round-off
 FORESEEN = 0.1  # of the tolerance: a defect this small needs no better effort before it is confirmed
 EASY = 3  # rounds of an easy step
 PATIENCE = 4  # easy steps in a row after which a halved step grows
@@ -69,7 +71,8 @@ class EnergyConsistent:
         self.counters = Counters()
         self._guess = Extrapolation(mobility.result(), impedance.result(), bond.idle_power)
         self._one = np.eye(bond.size)
-        self._Z = self._Y = self._inertia = np.empty((0, 0))  # the last is Y^-1
+        self._Z = self._Y = np.empty((0, 0))
+        self._inverse: Matrix | None = None  # Y^-1, once it is asked for
         self._length = 0.0  # the step they belong to; 0: none
         self._converged = False
         self._easy = 0  # steps of the wanted length that took few rounds, in a row
@@ -113,14 +116,20 @@ class EnergyConsistent:
         flow, effort = self._guess.at(time + step / 2)
         fresh = abs(step - self._length) > SLIVER * step  # slopes of another step length are of no use
         free = self.mobility.solve(time, step, effort)
-        if fresh:
-            mobility = self.mobility.derivative()
-            self._set_mobility(self._differences(self.mobility, time, step, effort, free) if mobility is None else mobility)
+        mobility = self.mobility.derivative() if fresh or self.impedance.yields else None
+        if mobility is not None:
+            self._set_mobility(mobility)
+        elif fresh:
+            self._set_mobility(self._differences(self.mobility, time, step, effort, free))
         free = free - self._Y @ effort
         met, foreseen = self.impedance.meet(time, step, free, self._Y), False
         if met is not None:
             flow, effort = met
             new_flow = self.mobility.solve(time, step, effort)
+            trial = Step(time, step, new_flow, effort, step * float(effort @ (new_flow - flow)), 1)
+            self._converged = not fresh and self._alike(flow, trial)
+            if self._converged:
+                return trial
             foreseen = not fresh and self._agree(flow, effort, new_flow)
             if not foreseen and (mobility := self.mobility.derivative()) is not None:
                 self._set_mobility(mobility)
@@ -162,6 +171,12 @@ class EnergyConsistent:
             flow, effort, free, on_law = new_flow, new_effort, new_flow - self._Y @ held, True
         return trial
 
+    def _alike(self, met: Vector, trial: Step) -> bool:
+        """Whether the flow that the impedance end met is the one that the mobility end answers, to round-off: then the step is done."""
+        apart, size = self.bond.sizes(np.array([met - trial.flow, trial.flow]))
+        agreed = bool((apart <= SAME * size + STILL * self.bond.floors).all())
+        return agreed and abs(trial.residual) <= self.tolerance * self._energy_scale(trial)
+
     def _agree(self, met: Vector, effort: Vector, answered: Vector) -> bool:
         """Whether the mobility end answers an effort with the flow that the impedance end met, by the defect to be expected."""
         gap = self._Z @ (met - answered)
@@ -188,8 +203,9 @@ class EnergyConsistent:
         otherwise let residuals pass that add up to more than the tolerance of the energy exchanged.
         """
         exchanged = trial.step * abs(float(trial.effort @ trial.flow))
-        kinetic = trial.step * abs(float(trial.flow @ self._inertia @ trial.flow)) / 4  # Y = H/2 x inverse inertia
-        mean = (self._exchanged + exchanged) / (self.counters.steps + 1)
+        mean, kinetic = (self._exchanged + exchanged) / (self.counters.steps + 1), 0.0
+        if mean > exchanged:
+            kinetic = trial.step * abs(float(trial.flow @ self._inertia @ trial.flow)) / 4  # Y = H/2 x inverse inertia
         return max(exchanged, min(kinetic, mean), trial.step * self.bond.idle_power(trial.effort))
 
     def _differences(self, end: End, time: float, step: float, held: Vector, result: Vector) -> Matrix:
@@ -199,11 +215,16 @@ class EnergyConsistent:
         return np.column_stack(columns)
 
     def _set_mobility(self, Y: Matrix) -> None:
-        self._Y = Y
-        try:
-            self._inertia = np.linalg.inv(Y)
-        except np.linalg.LinAlgError:  # an end that cannot move in some direction has no inertia there
-            self._inertia = np.linalg.pinv(Y)
+        self._Y, self._inverse = Y, None
+
+    @property
+    def _inertia(self) -> Matrix:
+        if self._inverse is None:
+            try:
+                self._inverse = np.linalg.inv(self._Y)
+            except np.linalg.LinAlgError:  # an end that cannot move in some direction has no inertia there
+                self._inverse = np.linalg.pinv(self._Y)
+        return self._inverse
 
     def _broyden(self, d_flow: Vector, d_force: Vector) -> None:
         """Least change of Z, measured by the inertia, that explains the last two points."""

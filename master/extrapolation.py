@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
-from itertools import islice
+from collections.abc import Callable
+from math import nan
 
 import numpy as np
 
@@ -23,19 +23,21 @@ class Extrapolation:
         self._nodes: deque[float] = deque(maxlen=HIGHEST_ORDER + 1)  # the latest first
         self._differences: list[Vector] = []  # divided ones, of order 0, 1, ... from the latest node back
         self._errors = [0.0] * (HIGHEST_ORDER + 1)
+        self._expected: tuple[float, list[Vector]] = (nan, [])  # the time last asked for, and the values there by order
 
     def at(self, time: float) -> tuple[Vector, Vector]:
         """Flow and effort expected as the mean over a step with this middle."""
         value = self._start
         if self._differences:
-            best = min(range(len(self._differences)), key=self._errors.__getitem__)
-            *_, value = islice(self._orders(time), best + 1)
+            self._expected = time, self._orders(time)
+            value = self._expected[1][min(range(len(self._differences)), key=self._errors.__getitem__)]
         return value[: self._n], value[self._n :]
 
     def add(self, time: float, flow: Vector, effort: Vector) -> None:
         """Take in an accepted step and judge the orders by it."""
         if self._differences:
-            missed = effort - np.array([value[self._n :] for value in self._orders(time)])
+            asked, values = self._expected
+            missed = effort - np.array(values if asked == time else self._orders(time))[:, self._n :]
             for order, error in enumerate(self._norm(missed).tolist()):
                 self._errors[order] = max(error, MEMORY * self._errors[order])
         found = [np.concatenate([flow, effort])]
@@ -44,11 +46,10 @@ class Extrapolation:
         self._nodes.appendleft(time)
         self._differences = found
 
-    def _orders(self, time: float) -> Iterator[Vector]:
+    def _orders(self, time: float) -> list[Vector]:
         """The values extrapolated with rising order, by Newton's form."""
-        value, product = self._differences[0], 1.0
-        yield value
+        values, product = self._differences[:1], 1.0
         for node, difference in zip(self._nodes, self._differences[1:], strict=False):
             product *= time - node
-            value = value + product * difference
-            yield value
+            values.append(values[-1] + product * difference)
+        return values

@@ -194,7 +194,7 @@ class Ledger:
 
     def _largest(self) -> float:
         """Magnitude of the largest column as last read."""
-        return max((float(np.abs(account.now).max(initial=0.0)) for account in self._accounts), default=0.0)
+        return max((abs(value) for account in self._accounts for value in account.now.tolist()), default=0.0)
 
     def _sent_back(self, time: float, closure: float, residual: float, exchanged: float, allowed: float) -> bool:
         """Deal with a violation; True if the step is to be repeated."""

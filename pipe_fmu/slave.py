@@ -17,6 +17,7 @@ Port = tuple[int, str | tuple[str, ...], str]
 _MOTION = "of the hang-off point, mean over the coming step, in e"
 UNSTABLE = "statics: the equilibrium is not stable; the line will leave it at the least push"
 _PULL = "of the pipe on the vessel at the hang-off point, in e"
+_WORKS = tuple(f"{work}_work" if work == "current" else f"{work}_dissipation" for work in WORKS)  # their ports
 _MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) + 3 * ("rad/(N.m.s)",))
 _IMPEDANCE = 3 * (3 * ("N.s/m",) + 3 * ("N.s/rad",)) + 3 * (3 * ("N.s",) + 3 * ("N.m.s/rad",))
 _AT_LEAST_ZERO = (
@@ -119,7 +120,9 @@ class PipeUnit:
 
         A top that yields gets no sub-steps: each part would have a velocity of its own, and the work would not be that of the means.
         """
-        start, mobility = self.state[0]._replace(time=time), np.reshape(inputs["mobility"], (6, 6))
+        start, mobility = self.state[0], inputs["mobility"].reshape(6, 6)
+        if start.time != time:
+            start = start._replace(time=time)
         most = 1 if mobility.any() else self._most
         step = partial(self._pipe.step, mobility=mobility)
         result, parts = substeps.divide(step, start, inputs["velocity"], inputs["angular_velocity"], h, most)
@@ -167,10 +170,8 @@ class PipeUnit:
             memo |= {kind: np.array([value]) for kind, value in zip(kinds, self._pipe.energies(state), strict=True)}
         elif name == "top_work":
             memo[name] = np.array([state.top_work])
-        elif name == "current_work":
-            memo[name] = np.array([state.works[WORKS.index("current")]])
-        elif name.endswith("_dissipation"):
-            memo[name] = np.array([state.works[WORKS.index(name.removesuffix("_dissipation"))]])
+        elif name in _WORKS:
+            memo |= {port: state.works[i : i + 1] for i, port in enumerate(_WORKS)}
         elif name == "pipe_length":
             memo[name] = np.array([self._pipe.stretched_length(state)])
         elif name == "newton_iterations":

@@ -116,7 +116,7 @@ def test_the_pipe_against_a_body_of_any_mass(rest, mass, step, duration, state):
     assert found.finished
     assert found.residual <= 1e-6
     assert max(found.gap_m, found.gap_rad) <= 1e-9
-    assert found.solves == 2.0
+    assert found.solves <= 2.0
     assert found.holds or duration < bodies.DURATION  # the pull is as the state says, over the whole
 
 

@@ -1,6 +1,7 @@
 """The vessel as a co-simulation unit: ports by name, snapshots as references. Knows nothing of FMI."""
 
 import math
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -87,9 +88,9 @@ class VesselUnit:
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
         """Step from `time`, s, by h, s; a message and the state unchanged if Newton did not converge."""
-        pull = {name: inputs[name] + inputs[f"{name}_change"] for name in ("force", "moment")}
-        others = {name: inputs[name] for name in ("control_force", "environment_force", "environment_moment")}
-        result = self.vessel.step(self._state, time, h, Inputs(**pull, **others))
+        force, moment = inputs["force"] + inputs["force_change"], inputs["moment"] + inputs["moment_change"]
+        loads = Inputs(force, moment, inputs["control_force"], inputs["environment_force"], inputs["environment_moment"])
+        result = self.vessel.step(self._state, time, h, loads)
         if not result.converged:
             return f"vessel: Newton stopped at a relative unbalance of {result.residual:.1e} after {result.iterations} iterations"
         self.state = result.state
@@ -126,15 +127,17 @@ class VesselUnit:
             return {"hang_off_position": point, "hang_off_quaternion": quaternion}
         if name in ("roll", "pitch", "yaw"):
             return {n: np.array([v]) for n, v in zip(("roll", "pitch", "yaw"), angles_from_quaternion(state.quaternion), strict=True)}
-        values = {
-            "mobility": lambda: state.mobility.ravel(),
-            "position": lambda: vessel.position(state),
-            "quaternion": lambda: state.quaternion,
-            "body_velocity": lambda: state.body_velocity,
-            "set_point": lambda: state.control.reference[0],
-            "thrust": lambda: vessel.thrust(state),
-            "kinetic_energy": lambda: np.array([vessel.kinetic_energy(state)]),
-            "hold_energy": lambda: np.array([vessel.hold_energy(state)]),
-            "restoring_energy": lambda: np.array([vessel.restoring_energy(state)]),
-        }
-        return {name: values[name]()}
+        return {name: _VALUES[name](vessel, state)}
+
+
+_VALUES: dict[str, Callable[[Vessel, State], Array]] = {
+    "mobility": lambda vessel, state: state.mobility.ravel(),
+    "position": lambda vessel, state: vessel.position(state),
+    "quaternion": lambda vessel, state: state.quaternion,
+    "body_velocity": lambda vessel, state: state.body_velocity,
+    "set_point": lambda vessel, state: state.control.reference[0],
+    "thrust": lambda vessel, state: vessel.thrust(state),
+    "kinetic_energy": lambda vessel, state: np.array([vessel.kinetic_energy(state)]),
+    "hold_energy": lambda vessel, state: np.array([vessel.hold_energy(state)]),
+    "restoring_energy": lambda vessel, state: np.array([vessel.restoring_energy(state)]),
+}

@@ -14,6 +14,7 @@ from . import failure
 from .failure import Refused, printable, where
 
 OK, DISCARD, ERROR = 0, 2, 3
+HEAD, REPLY = struct.Struct("ii"), struct.Struct("II")
 FORMATS = "dii"  # of real, integer, boolean
 GETTERS = ("get_real", "get_integer", "get_boolean", "get_string")
 SETTERS = ("set_real", "set_integer", "set_boolean", "set_string")
@@ -52,12 +53,11 @@ class Server:
 
     def answer(self, request: bytes) -> bytes:
         """The answer to one request."""
-        view = memoryview(request)
-        function, instance = struct.unpack_from("ii", view)
+        function, instance = HEAD.unpack_from(request)
         status, result, log = OK, b"", b""
         slot = self.slots.get(instance)
         try:
-            result = self._call(function, instance, slot, view[8:]) or b""
+            result = self._call(function, instance, slot, memoryview(request)[8:]) or b""
         except _DiscardedError:
             status = DISCARD
         except Exception as error:  # all there is: a host must never see one
@@ -67,7 +67,7 @@ class Server:
             queue = slot.slave.log_queue
             log = b"".join(_record(it.status.value, it.category, it.msg) for it in queue) + log
             queue.clear()
-        return struct.pack("II", status, len(result)) + result + log
+        return REPLY.pack(status, len(result)) + result + log
 
     def _call(self, function: int, instance: int, slot: _Slot | None, data: memoryview) -> bytes | None:
         if function == 0:
@@ -75,13 +75,13 @@ class Server:
             return None
         if slot is None:
             raise Refused(f"instance {instance}: there is none")
-        if function == 1:
-            del self.slots[instance]
-            return None
         if function >= 30:
             return self._set(slot, function - 30, data)
         if function >= 20:
             return self._get(slot, function - 20, data)
+        if function == 1:
+            del self.slots[instance]
+            return None
         return self.functions[function - 2](slot, data)
 
     def _instantiate(self, instance: int, data: memoryview) -> None:
