@@ -78,7 +78,7 @@ def parser() -> argparse.ArgumentParser:
     hard = command(
         "hard-cases",
         "Run the pipe alone where simulations of lines fail, each case at three steps.",
-        "file written: hard-cases.csv; all of it takes a few minutes",
+        "file written: hard-cases.csv; all of it takes ten seconds once compiled",
     )
     _study_arguments(hard, "the cases by their names")
     measured = command(

@@ -170,7 +170,7 @@ def _progress(end: float, stream: TextIO) -> Any:
 
 def _patience(stream: TextIO) -> threading.Timer:
     """A timer that says why it takes long, if it does and somebody sits at the terminal; to be cancelled."""
-    words = "a first run compiles the numerical kernels, which takes a minute or two; later runs find them again"
+    words = "a first run compiles the numerical kernels, which takes about a minute; later runs find them again"
     timer = threading.Timer(SLOW, tqdm.write, [words, stream])
     timer.daemon = True
     if stream.isatty():

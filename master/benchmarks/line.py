@@ -63,7 +63,7 @@ _EXUDYN = (Setting(EXUDYN, 24, 0.2), Setting(EXUDYN, 48, 0.2), _COARSE, _FINE, S
 _SHEAR = f"pipe.section.shear_stiffness={PIPE.section.stiffness[1]!r}"
 CASES = {
     "heave": LineCase(
-        swing(2.0, 12.0), 300.0, (*_CRUDE, *_OURS, *_EXUDYN, _LUMPED, _LUMPED_FINE, *_PAPER, _STUCK),
+        swing(2.0, 12.0), 300.0, (*_OURS, *_CRUDE, *_EXUDYN, _LUMPED, _LUMPED_FINE, *_PAPER, _STUCK),
         Setting(OWN, 192, 0.025, "adapted"), Setting(OWN, 96, 0.05, "adapted"), (_SHEAR,),
     ),
     "snap": LineCase(

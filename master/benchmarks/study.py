@@ -39,7 +39,8 @@ class Limit(NamedTuple):
 
 def _line(name: str, folder: Path, tick: Tick) -> tuple[Rows, list[str], list[Limit]]:
     rows, bound = line.sweep(line.CASES[name], tick)
-    draw(folder / f"{name}.png", f"{name}: CPU time against error", rows, line.KEYS[0], "Position error, rms over time [m]", bound[0])
+    whole = [row for row in rows if row["simulated_s"] == line.CASES[name].duration]
+    draw(folder / f"{name}.png", f"{name}: CPU time against error", whole, line.KEYS[0], "Position error, rms over time [m]", bound[0])
     words = [f"  uncertainty of the reference: {bound[0]:.1e} m, {bound[1]:.1e} N, {bound[2]:.1e} N m (rms)"]
     if missing := line.missing():
         words.append(f"  not installed, so left out: {', '.join(missing)} (pip install 'pipelay[bench]')")
