@@ -44,8 +44,8 @@ class Bonded(OnBond):
         else:
             self._ends = end_value_ends(impedance, mobility, bond)
         reported = [(wiring.fmus[name], scene.units[name].energy) for name in (table.impedance, table.mobility)]
-        sources = [(fmu, energy.columns) for fmu, energy in reported if energy is not None]
-        self.ledger = Ledger(sources if len(sources) == 2 else [], rules.energy_check, rules.on_violation, bond.idle_power)
+        sources = [(fmu, energy.columns) for fmu, energy in reported if energy is not None]  # of both or, checked before, of neither
+        self.ledger = Ledger(sources, rules.energy_check, rules.on_violation, bond.idle_power)
         self._coupling = coupling(rules.scheme, *self._ends, bond, self._macro_step, rules.tolerance, self.ledger.check)
 
     @property

@@ -76,7 +76,8 @@ def configurations(path: Path, shapes: Shapes, instants: Sequence[float]) -> Non
                           color=look["color"], markerfacecolor=filled, clip_on=False)  # fmt: skip
         side.set(xlabel="Forward x [m]", ylabel="Height above the seabed [m]", title="From the side")
         behind.set(xlabel="Starboard y [m]", title="From behind")
-        side.set_aspect("equal", adjustable="datalim")
+        behind.tick_params(labelleft=True)  # the panels may differ in height
+        side.set_aspect("equal", adjustable="box")
         span = np.ptp(shapes.position[picked, :, 1])
         if span < 1e-3:
             behind.set_xlim(-1.0, 1.0)

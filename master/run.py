@@ -7,6 +7,7 @@ with it, signals.csv has every step before.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
 import threading
@@ -152,14 +153,20 @@ def _move_into_place(scratch: Path, folder: Path) -> None:
 @contextmanager
 def _scratch_folder(folder: Path) -> Iterator[Path]:
     """A folder in `folder`, or beside it, for files in the making. Raises UsageError where none can be made."""
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         prefix = post_mortem.scratch_prefix(os.getpid())
         scratch = tempfile.TemporaryDirectory(prefix=prefix, dir=folder if folder.is_dir() else folder.parent)
     except OSError as error:
         raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-    with scratch as name:
-        yield Path(name)
+    try:
+        with scratch as name:
+            yield Path(name)
+    finally:
+        for made in missing:
+            with contextlib.suppress(OSError):  # not empty: there are results
+                made.rmdir()
 
 
 def _progress(end: float, stream: TextIO) -> Any:

@@ -7,6 +7,7 @@ units stay plain mappings, which the process that prepares a run hands to the un
 from __future__ import annotations
 
 import difflib
+import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -75,6 +76,10 @@ class Sections:
             owner, _, key = name.rpartition(".")
             if getattr(getattr(self, owner) if owner else self, key) is not None:
                 raise ValueError(f"{name}: must be absent without [vessel], on which it acts")
+        for key in ("scheme", "tolerance", "rollback"):
+            if (value := getattr(self.coupling, key)) != (usual := getattr(Coupling(), key)):
+                given, allowed = json.dumps(value), json.dumps(usual)
+                raise ValueError(f"coupling.{key} = {given}: must be {allowed} or absent without [vessel]: there is nothing to couple")
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from vessel_fmu.parameters import Start, VesselParameters
 from vessel_fmu.vessel import Vessel
 
 T = TypeVar("T")
+P = TypeVar("P", PipeParameters, VesselParameters)
 _UNBALANCE = 1e-9  # of the pipe's pull (times a metre for moments) left to the vessel
 _NOISE = 1e-12  # of a vector's norm: components below it are round-off
 
@@ -144,7 +145,7 @@ def _floating(scene: Scene, pipe_parameters: PipeParameters, parameters: VesselP
         rest = relative * Rotation.from_euler("y", -angle)
         posed = replace(posed, departure_angle=angle, departure_rotation=_three(rest.as_rotvec()))
     hold = _without_noise((-force[0], -force[1], -moment[2]))
-    posed = _checked_replace(posed, {"hold_force": _three(hold)})
+    posed = _replaced("vessel", posed, hold_force=_three(hold))
     body = Vessel(posed)
     _, held = body.hang_off_pose(np.array(posed.start.position), body.start().quaternion)
     return Prepared(_posed(pipe_parameters, point, held), posed, found)
@@ -174,7 +175,7 @@ def _pipe(scene: Scene, top: tuple[float, float, float]) -> PipeParameters:
         name, value = ("start.x", x) if abs(x) >= abs(y) else ("start.y", y)
         rule = f"must keep the distance from foot to top, {distance:.6g} m, below pipe.length = {pipe.length:g} m"
         raise UsageError(f"{name} = {value:g}: {rule}")
-    return replace(pipe, top_position=top)
+    return _replaced("pipe", pipe, top_position=top)
 
 
 def _checked(kind: type[T], mapping: dict[str, Any], path: str) -> T:
@@ -184,11 +185,12 @@ def _checked(kind: type[T], mapping: dict[str, Any], path: str) -> T:
         raise UsageError(str(error).replace(f"{path}.environment.", "environment.")) from None
 
 
-def _checked_replace(vessel: VesselParameters, changes: dict[str, Any]) -> VesselParameters:
+def _replaced(unit: str, parameters: P, **changes: Any) -> P:
+    """The parameters of a unit with some replaced. Raises UsageError."""
     try:
-        return replace(vessel, **changes)
+        return replace(parameters, **changes)
     except ValueError as error:
-        raise UsageError(f"vessel.{error}") from None
+        raise UsageError(f"{unit}.{error}") from None
 
 
 def _resolved(parameters: PipeParameters) -> PipeParameters:
@@ -204,10 +206,7 @@ def _placed(pipe: PipeParameters, found: Equilibrium) -> PipeParameters:
 
 def _posed(pipe: PipeParameters, point: np.ndarray, quaternion: np.ndarray) -> PipeParameters:
     w, x, y, z = (float(q) for q in quaternion)
-    try:
-        return replace(pipe, top_position=_three(point), top_quaternion=(w, x, y, z))
-    except ValueError as error:
-        raise UsageError(f"pipe.{error}") from None
+    return _replaced("pipe", pipe, top_position=_three(point), top_quaternion=(w, x, y, z))
 
 
 def _rotation(quaternion: np.ndarray) -> Rotation:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from typing import Any
 
 from master.bond import Bond, Pair
 from master.errors import UsageError
@@ -11,6 +12,7 @@ from master.fmu import Fmu, FmuFailed
 from master.port import ENERGY, POWER, Port
 from master.units import General, PairOfPorts
 
+TYPES: dict[str, tuple[type, ...]] = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,)}  # of FMI variables; others are texts
 WHOLE = 1e-12  # of a number: this close it is whole but for round-off
 
 
@@ -107,7 +109,11 @@ class Wiring:
                 raise UsageError(f"coupling.on_violation = 'refine': must be stop or warn, for unit {unit} cannot vary its step")
 
     def check_settings(self) -> None:
-        """Recorded outputs, energies, parameters and inputs exist."""
+        """Recorded outputs, energies, parameters and inputs exist; of the two units on the bond none or both report energies."""
+        ends = (self.scene.bond.impedance, self.scene.bond.mobility)
+        silent = [unit for unit in ends if self.scene.units[unit].energy is None]
+        if len(silent) == 1:
+            raise UsageError(f"units.{silent[0]}.energy = nothing: must be given, as for the other unit on the bond, or for neither")
         for unit, table in self.scene.units.items():
             for name in table.outputs:
                 self.port(f"units.{unit}.outputs", unit, name, "output")
@@ -120,12 +126,12 @@ class Wiring:
                             raise UsageError(f"units.{unit}.energy.{key} = {name!r}: is in {port.unit}, must be in J")
             for name, value in self.scene.settings[unit]["inputs"].items():
                 port = self.port(f"units.{unit}.inputs.{name}", unit, name, "input")
-                if (len(value) if isinstance(value, list) else 1) != port.size:
-                    raise UsageError(f"units.{unit}.inputs.{name} = {value}: must have {port.size} values")
+                _check_value(f"units.{unit}.inputs.{name}", value, port)
             for name, value in self.scene.settings[unit]["parameters"].items():
                 if (known := self.fmus[unit].ports.get(name)) is None or known.causality in ("output", "input"):
                     there = ", ".join(self.fmus[unit].names("parameter")) or "none"
                     raise UsageError(f"units.{unit}.parameters.{name} = {value}: unknown parameter; there are {there}")
+                _check_value(f"units.{unit}.parameters.{name}", value, known)
 
 
 def _check_unit(where: str, source: Port, target: Port) -> None:
@@ -151,3 +157,14 @@ def loaded(scene: General) -> Iterator[Wiring]:
         wiring.check_settings()
         wiring.check_steps()
         yield wiring
+
+
+def _check_value(key: str, value: Any, port: Port) -> None:
+    """A setting has the size and the type of its port. Raises UsageError."""
+    values = value if isinstance(value, list) else [value]
+    if len(values) != port.size:
+        raise UsageError(f"{key} = {value!r}: must have {port.size} value{'s' * (port.size > 1)}")
+    allowed = TYPES.get(port.kind, (str,))
+    for one in values:
+        if not isinstance(one, allowed) or (isinstance(one, bool) and port.kind != "Boolean"):
+            raise UsageError(f"{key} = {value!r}: must be of type {port.kind}")

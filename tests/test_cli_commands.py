@@ -170,6 +170,11 @@ def test_results_replace_those_of_an_earlier_run_and_nothing_else(still, tmp_pat
         (["run", "-o", "/proc/pipelay"], "--output = '/proc/pipelay': cannot be written"),
         (["export", "-o", "/proc/pipelay"], "--output = '/proc/pipelay': cannot be written"),
         (["statics", "paper", "--set", "pipe"], "--set pipe"),
+        (["statics", "paper", "--set", "pipe.top_range=100"], "pipe.top_range = 100: must be"),
+        (["statics", "paper", "--set", f"pipe.length=1{'0' * 400}"], "must be finite"),
+        (["statics", "paper", "--set", "vessel.added_mass.sway_yaw=1e9"], "vessel.added_mass.sway_yaw = 1e+09: must"),
+        (["statics", "paper", "--set", "vessel.damping.heave_pitch=1e12"], "vessel.damping.heave_pitch = 1e+12: must"),
+        (["run", "heave", "--set", "coupling.rollback=false"], "coupling.rollback = false: must be true"),
     ],
 )
 def test_a_mistake_is_one_line_on_the_error_stream_with_exit_code_2(arguments, named, capsys):
@@ -178,6 +183,11 @@ def test_a_mistake_is_one_line_on_the_error_stream_with_exit_code_2(arguments, n
     assert named in error
     assert error.startswith("pipelay: ")
     assert error.count("\n") == 1
+
+
+def test_a_refused_scene_leaves_no_folder_behind(tmp_path, capsys):
+    assert main(["run", "--set", "pipe.lenght=1", "-o", str(tmp_path / "a" / "b")]) == 2
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("arguments", [[], ["simulate"], ["run", "--sett", "a=1"]])

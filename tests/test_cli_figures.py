@@ -1,9 +1,12 @@
 """Figures and recorded files from a catenary swinging in a current, with a made-up but plausible energy history."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from master.figures import draw_all
+from master.figures import configurations, draw_all
 from master.recorder import Shapes, Table
 
 LENGTH, DEPTH, WEIGHT = 1200.0, 800.0, 759.1
@@ -58,6 +61,22 @@ def test_every_figure_of_the_paper_is_a_picture(tmp_path, shapes):
     files = draw_all(tmp_path, energy_history(), shapes, [30.0])
     assert [f.name[:4] for f in files] == [*(f"fig{n}" for n in range(3, 10)), "ener"]
     assert all(f.read_bytes().startswith(b"\x89PNG") for f in files)
+
+
+@pytest.mark.parametrize("stretch", [1.0, 8.0])
+def test_figure_3_shows_the_whole_pipe_in_one_scale_however_flat_it_lies(tmp_path, shapes, monkeypatch, stretch):
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path: (figure.draw_without_rendering(), drawn.append(figure)))
+    long = replace(shapes, position=shapes.position * [stretch, 1.0, 1.0])
+    configurations(tmp_path / "fig3.png", long, [30.0])
+    side, behind = drawn[0].axes
+    for axes in (side, behind):
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        for line in axes.lines:
+            x, y = line.get_data()
+            assert left <= min(x) <= max(x) <= right
+            assert low <= min(y) <= max(y) <= high
+    assert side.get_aspect() == 1.0
 
 
 def test_without_shapes_only_the_energy_figure_is_drawn(tmp_path):

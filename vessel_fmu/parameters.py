@@ -64,7 +64,8 @@ class LinearDamping:
     def __post_init__(self) -> None:
         check_fields(self)
         if np.linalg.eigvalsh(symmetric_matrix(self))[0] < -1e-12 * max(getattr(self, mode) for mode in MODES):
-            raise ValueError(f"sway_yaw = {self.sway_yaw:g} and the other couplings: must leave the damping positive semidefinite")
+            name = largest_coupling(self)
+            raise ValueError(f"{name} = {getattr(self, name):g}: must leave the damping matrix positive semidefinite, with the others")
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,9 @@ class VesselParameters:
     def __post_init__(self) -> None:
         check_fields(self)
         if np.linalg.eigvalsh(mass_matrix(self))[0] <= 0.0:
-            raise ValueError(f"added_mass = {self.added_mass}: must leave the 6 x 6 mass matrix positive definite")
+            name = largest_coupling(self.added_mass)
+            value = getattr(self.added_mass, name)
+            raise ValueError(f"added_mass.{name} = {value:g}: must leave the 6 x 6 mass matrix positive definite, with the others")
         if self.controller is not None:
             self._check_hold(self.controller)
 
@@ -155,6 +158,11 @@ class VesselParameters:
             if abs(value) > limit:
                 rule = f"must be >= the hold thrust {abs(value):.6g} {unit}"
                 raise ValueError(f"controller.{mode}_limit = {limit:g}: {rule}")
+
+
+def largest_coupling(entries: AddedMass | LinearDamping) -> str:
+    """Name of the coupling that is largest in magnitude."""
+    return max(COUPLINGS, key=lambda name: abs(getattr(entries, name)))
 
 
 def symmetric_matrix(entries: AddedMass | LinearDamping) -> np.ndarray:

@@ -105,6 +105,13 @@ def override(tree: T, changes: Mapping[str, Any]) -> T:
     return build(type(tree), mapping)
 
 
+def _is_finite(value: float | int) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond all floats
+        return False
+
+
 def _convert(hint: Any, value: Any, where: str) -> Any:
     origin, arguments = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
@@ -121,7 +128,7 @@ def _convert(hint: Any, value: Any, where: str) -> Any:
     accepted = (float, int) if hint is float else hint
     if not isinstance(value, accepted) or (isinstance(value, bool) and hint is not bool):
         raise _fault(where, value, _RULES[hint])
-    if hint is float and not math.isfinite(value):
+    if hint is float and not _is_finite(value):
         raise _fault(where, value, "must be finite")
     return hint(value)
 
