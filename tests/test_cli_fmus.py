@@ -12,7 +12,7 @@ from master import drive, scene
 from master.__main__ import main
 from master.bond import FmuEnd, mobility_end
 from master.drive import open_drive
-from master.fmu import Fmu
+from master.fmu import Fmu, FmuFailed
 from master.ledger import EnergyCheckFailed
 from master.prepared import prepare
 
@@ -136,6 +136,25 @@ def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
     with open_drive(loaded.sections, exported) as moving:
         gap = drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
         assert max(gap.values()) < 1e-9
+
+
+@pytest.mark.parametrize("damping", ["internal", "numerical"])
+def test_a_damping_that_the_pipe_has_no_output_for_is_refused(damping):
+    """Its energy would be missing from the balance."""
+    with Fmu(prepare(scene.load("paper")).fmus["pipe"], "pipe") as pipe:
+        reason = f"^pipe: initialisation: {damping}_damping: adds the output {damping}_dissipation; such an FMU must be exported anew$"
+        with pytest.raises(FmuFailed, match=reason):
+            pipe.initialize({f"{damping}_damping": 0.05})
+
+
+def test_an_exported_pipe_of_another_length_gets_new_nodes_where_its_own_are_dropped():
+    exported = prepare(scene.load("paper")).fmus["pipe"]
+    with Fmu(exported, "pipe") as pipe, pytest.raises(FmuFailed, match=r"length 1210 m; an empty one places the nodes anew"):
+        pipe.initialize({"length": 1210.0})
+    with Fmu(exported, "pipe") as pipe:
+        pipe.initialize({"length": 1210.0, "nodes_at": "[]"})
+        assert pipe.get("s")[[0, -1]].tolist() == [0.0, 1210.0]
+        assert pipe.get("pipe_length")[0] == pytest.approx(1210.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("unit", ["pipe", "vessel"])
