@@ -25,9 +25,10 @@ SSD, SSC = "http://ssp-standard.org/SSP1/SystemStructureDescription", "http://ss
 OSP_SYSTEM = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 OSP_MODEL = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
 ECCO_BOND = 0  # surge, where the vessel's positioning moves the pipe
+ECCO_RANGE = 20.0  # longest step over the shortest
 ECCO = {
-    "SafetyFactor": 0.99, "MinimumStepSize": 0.005, "MaximumStepSize": 0.1, "MinimumChangeRate": 0.2, "MaximumChangeRate": 1.5,
-    "ProportionalGain": 0.2, "IntegralGain": 0.15, "RelativeTolerance": 1e-3, "AbsoluteTolerance": 0.1,
+    "SafetyFactor": 0.99, "MinimumChangeRate": 0.2, "MaximumChangeRate": 1.5, "ProportionalGain": 0.2, "IntegralGain": 0.15,
+    "RelativeTolerance": 1e-3, "AbsoluteTolerance": 0.1,
 }  # fmt: skip
 
 
@@ -129,7 +130,8 @@ def osp_structure(fmus: Mapping[str, Path], macro_step: float, bond: int | None 
                 SubElement(connection, "Variable", {"simulator": unit, "name": name} | ({"causality": causality} if bonded else {}))
     if bond is not None:
         parameters = SubElement(root, "EccoConfiguration")
-        for name, value in {"StepSize": macro_step, **ECCO}.items():
+        steps = {"StepSize": macro_step, "MinimumStepSize": macro_step / ECCO_RANGE, "MaximumStepSize": macro_step}
+        for name, value in {**steps, **ECCO}.items():
             SubElement(parameters, name).text = repr(value)
     return root
 
