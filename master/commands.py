@@ -51,7 +51,7 @@ def export(options: argparse.Namespace) -> int:
         tempfile.TemporaryDirectory(dir=folder).cleanup()  # before the work, as a trial
     except OSError as error:
         raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-    fmus = prepare(scene, ["--export", str(folder), *(["--portable"] if options.portable else [])]).fmus
+    fmus = prepare(scene, ["--export", str(folder), *(["--portable"] if options.portable else [])])
     simulation = scene.sections.simulation
     joined = write_system(fmus, folder, simulation.macro_step, simulation.duration) if "vessel" in fmus else []
     for path in (*fmus.values(), *joined):

@@ -3,7 +3,6 @@
 import json
 import re
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -132,7 +131,7 @@ def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
     assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in EXPORTED]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(EXPORTED)
     loaded = scene.load("paper")
-    exported = replace(prepare(loaded), fmus={name: tmp_path / f"{name}.fmu" for name in ("pipe", "vessel")})
+    exported = {name: tmp_path / f"{name}.fmu" for name in ("pipe", "vessel")}
     with open_drive(loaded.sections, exported) as moving:
         gap = drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
         assert max(gap.values()) < 1e-9
@@ -141,14 +140,14 @@ def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
 @pytest.mark.parametrize("damping", ["internal", "numerical"])
 def test_a_damping_that_the_pipe_has_no_output_for_is_refused(damping):
     """Its energy would be missing from the balance."""
-    with Fmu(prepare(scene.load("paper")).fmus["pipe"], "pipe") as pipe:
+    with Fmu(prepare(scene.load("paper"))["pipe"], "pipe") as pipe:
         reason = f"^pipe: initialisation: {damping}_damping: adds the output {damping}_dissipation; such an FMU must be exported anew$"
         with pytest.raises(FmuFailed, match=reason):
             pipe.initialize({f"{damping}_damping": 0.05})
 
 
 def test_an_exported_pipe_of_another_length_gets_new_nodes_where_its_own_are_dropped():
-    exported = prepare(scene.load("paper")).fmus["pipe"]
+    exported = prepare(scene.load("paper"))["pipe"]
     with Fmu(exported, "pipe") as pipe, pytest.raises(FmuFailed, match=r"length 1210 m; an empty one places the nodes anew"):
         pipe.initialize({"length": 1210.0})
     with Fmu(exported, "pipe") as pipe:
@@ -161,7 +160,7 @@ def test_an_exported_pipe_of_another_length_gets_new_nodes_where_its_own_are_dro
 def test_a_rollback_is_bitwise_and_cheap(unit):
     """All outputs, after a live and after a serialised state; saving, restoring and freeing cost less than half a step."""
     loaded = scene.load("paper", BUSY)
-    fmu_file = prepare(loaded).fmus[unit]
+    fmu_file = prepare(loaded)[unit]
     with Fmu(fmu_file, unit) as fmu:
         fmu.initialize()
         flows = ("velocity", "angular_velocity") if unit == "pipe" else ("force", "moment")
