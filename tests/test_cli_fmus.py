@@ -3,11 +3,12 @@
 import json
 import re
 import time
+import zipfile
 
 import numpy as np
 import pytest
 
-from master import drive, scene
+from master import commands, drive, scene
 from master.__main__ import main
 from master.bond import FmuEnd, mobility_end
 from master.drive import open_drive
@@ -135,6 +136,26 @@ def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
     with open_drive(loaded.sections, exported) as moving:
         gap = drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
         assert max(gap.values()) < 1e-9
+
+
+def test_an_export_leaves_nothing_of_another_scenes_and_an_interrupted_one_nothing_of_its_own(tmp_path, monkeypatch, capsys):
+    for name in (*EXPORTED, "mine.fmu"):
+        (tmp_path / name).write_text("old")
+
+    def interrupted(fmus, folder, *_):
+        assert all(path.parent == folder and path.is_file() for path in fmus.values())
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(commands, "write_system", interrupted)
+        assert main(["export", "-o", str(tmp_path)]) == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*EXPORTED, "mine.fmu"])
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"old"}
+    capsys.readouterr()
+    assert main(["export", "--scene", "heave", "-o", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.split() == [str(tmp_path / "pipe.fmu")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.fmu", "pipe.fmu"]
+    assert zipfile.is_zipfile(tmp_path / "pipe.fmu")
 
 
 @pytest.mark.parametrize("damping", ["internal", "numerical"])

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .description import base_unit, scalar_names
 
@@ -66,15 +66,20 @@ PORTS = {  # unit -> (port element of the OSP, name, its effort and flow: elemen
 }
 
 
+SSP, OSP, OSP_ECCO = "system.ssp", "OspSystemStructure.xml", "OspSystemStructure_ecco.xml"
+OSP_MODELS = {name: f"{name.capitalize()}_OspModelDescription.xml" for name in PORTS}  # the OSP wants the FMI model name before it
+EXPORTED = (*(f"{name}.fmu" for name in PORTS), SSP, OSP, OSP_ECCO, *OSP_MODELS.values())
+
+
 def write_system(fmus: Mapping[str, Path], folder: Path, macro_step: float, duration: float) -> list[Path]:
     """system.ssp, the two OSP structures and the models' port descriptions for the FMUs `pipe` and `vessel`; step and end in s."""
     structure = structure_description(duration)
     files = {
-        "OspSystemStructure.xml": osp_structure(fmus, macro_step),
-        "OspSystemStructure_ecco.xml": osp_structure(fmus, macro_step, ECCO_BOND),
+        OSP: osp_structure(fmus, macro_step),
+        OSP_ECCO: osp_structure(fmus, macro_step, ECCO_BOND),
     }
-    files |= {f"{_model_name(path)}_OspModelDescription.xml": osp_model(name) for name, path in fmus.items()}
-    written = [folder / "system.ssp"]
+    files |= {OSP_MODELS[name]: osp_model(name) for name in fmus}
+    written = [folder / SSP]
     with zipfile.ZipFile(written[0], "w") as archive:
         archive.writestr("SystemStructure.ssd", _text(structure), zipfile.ZIP_DEFLATED)
         for name, path in fmus.items():
@@ -155,11 +160,6 @@ def osp_model(unit: str) -> Element:
 
 def _scalars(wire: Wire) -> Iterator[tuple[str, str]]:
     return zip(scalar_names(wire.output, 3), scalar_names(wire.input, 3), strict=True)
-
-
-def _model_name(fmu: Path) -> str:
-    with zipfile.ZipFile(fmu) as archive:
-        return fromstring(archive.read("modelDescription.xml")).get("modelName", "")
 
 
 def _text(root: Element) -> bytes:
