@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from master import scene as scenes_of
-from master.errors import UsageError
-from master.fmi.system import write_system
+from master.errors import RunError, UsageError
+from master.fmi.system import EXPORTED, write_system
+from master.interrupts import postponed
 from master.prepared import prepare
 
 
@@ -43,20 +44,35 @@ def statics(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write the FMUs of a scene, and the files that connect them, into a folder."""
+    """Write the FMUs of a scene, and the files that connect them, into a folder: all or none, instead of those of another export."""
     scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     folder = _folder(options.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryDirectory(dir=folder).cleanup()  # before the work, as a trial
+        unfinished = tempfile.TemporaryDirectory(prefix=".pipelay_", dir=folder)
     except OSError as error:
         raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-    fmus = prepare(scene, ["--export", str(folder), *(["--portable"] if options.portable else [])]).fmus
-    simulation = scene.sections.simulation
-    joined = write_system(fmus, folder, simulation.macro_step, simulation.duration) if "vessel" in fmus else []
-    for path in (*fmus.values(), *joined):
+    with unfinished as place:
+        fmus = prepare(scene, ["--export", place, *(["--portable"] if options.portable else [])])
+        simulation = scene.sections.simulation
+        joined = write_system(fmus, Path(place), simulation.macro_step, simulation.duration) if "vessel" in fmus else []
+        written = _moved([*fmus.values(), *joined], folder)
+    for path in written:
         _say(str(path))
     return 0
+
+
+def _moved(files: list[Path], folder: Path) -> list[Path]:
+    """The files of an export in their `folder`, where none of another export stays. Raises RunError."""
+    try:
+        with postponed():
+            written = [file.replace(folder / file.name) for file in files]
+            for name in EXPORTED:
+                if folder / name not in written:
+                    (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise RunError(f"{error.filename2 or error.filename}: cannot be replaced ({error.strerror})") from None
+    return written
 
 
 def scenes(options: argparse.Namespace) -> int:

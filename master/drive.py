@@ -16,7 +16,6 @@ from master.coupling import SMALLEST_STEP, EnergyConsistent, Explicit, OneSolve,
 from master.fmu import Fmu, Names, StepRejected
 from master.hang_off import hang_off
 from master.ledger import Columns, Ledger
-from master.prepared import Prepared
 from master.recorder import Source
 from master.remarks import Remarks
 from master.scene import Sections
@@ -201,15 +200,15 @@ class LoadedFmu(Fmu):
 
 
 @contextmanager
-def open_drive(sections: Sections, prepared: Prepared) -> Iterator[Coupled | Prescribed]:
-    """Load and initialise the FMUs of a prepared scene. Raises FmuFailed."""
+def open_drive(sections: Sections, fmus: Mapping[str, Path]) -> Iterator[Coupled | Prescribed]:
+    """Load and initialise the FMU files of a prepared scene, `pipe` and, unless its top is prescribed, `vessel`. Raises FmuFailed."""
     with ExitStack() as stack:
 
         def load(unit: str, kind: type[Fmu] = Fmu) -> Fmu:
-            return stack.enter_context(kind(Path(prepared.fmus[unit]), unit))
+            return stack.enter_context(kind(fmus[unit], unit))
 
         pipe = load("pipe")
-        pipe.initialize(prepared.parameters["pipe"])
+        pipe.initialize()
         if sections.top_motion is not None:
             yield Prescribed(pipe, sections.top_motion, sections)
             return
@@ -217,7 +216,7 @@ def open_drive(sections: Sections, prepared: Prepared) -> Iterator[Coupled | Pre
         if isinstance(vessel, LoadedFmu) and sections.tables:
             vessel.rows = sections.tables.environment
         pull = {name: pipe.get(name) for name in hang_off().efforts}
-        vessel.initialize(prepared.parameters["vessel"], inputs=pull)
+        vessel.initialize(inputs=pull)
         yield Coupled(pipe, vessel, sections)
 
 

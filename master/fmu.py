@@ -76,7 +76,6 @@ class Fmu:
             raise FmuFailed(f"{path}: not an FMU for co-simulation by FMI 2.0")
         self.can_rollback = bool(model.coSimulation.canGetAndSetFMUstate)
         self.has_derivatives = bool(model.coSimulation.providesDirectionalDerivative)
-        self.can_serialize = bool(model.coSimulation.canSerializeFMUstate)
         self.can_vary_step = bool(model.coSimulation.canHandleVariableCommunicationStepSize)
         folder = tempfile.TemporaryDirectory(prefix="fmu_")
         if "%" in Path(folder.name).as_uri().replace("%20", " "):  # PythonFMU knows no other escape, and would crash

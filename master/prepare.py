@@ -1,7 +1,7 @@
 """The process that prepares a run: checks the scene's units, finds the equilibrium, writes the FMUs.
 
 Reads the scene as JSON from standard input; `--export DIR` writes pipe.fmu and vessel.fmu there, with `--portable` ones that bring their
-Python, else they go to a cache by content. Prints one JSON object: fmus, parameters, equilibrium; or error and exit.
+Python, else they go to a cache by content. Prints one JSON object: fmus; or error and exit.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +26,12 @@ PACKAGES: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False) -> dict[str, Any]:
-    """FMU files, parameters to set and the equilibrium of a scene. Raises UsageError, RunError."""
+    """FMU files of a scene, which start in its equilibrium. Raises UsageError, RunError."""
     scene = from_mapping(mapping, "scene")
     folders = let_stand_in(PACKAGES)
     from master import statics  # of the packages that now stand in
 
-    rest = statics.equilibrium(scene)
-    at = statics.released(scene, rest)
+    at = statics.released(scene, statics.equilibrium(scene))
     simulation = scene.sections.simulation
     experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
     pull = (0.0 - at.found.top).tolist()  # no -0.0 among them
@@ -54,14 +53,7 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
         name: cached_fmu(recipe, cache_folder("fmus")) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
         for name, recipe in recipes.items()
     }
-    equilibrium: dict[str, Any] = {"top_force_e_N": rest.found.top[:3].tolist(), "top_moment_e_N_m": rest.found.top[3:].tolist()}
-    if at.vessel is not None:
-        equilibrium |= {"hold_force": at.vessel.hold_force, "vessel": asdict(at.vessel.start)}
-    return {
-        "fmus": {name: str(path) for name, path in fmus.items()},
-        "parameters": {name: {} for name in fmus},
-        "equilibrium": equilibrium,
-    }
+    return {"fmus": {name: str(path) for name, path in fmus.items()}}
 
 
 def main(arguments: list[str]) -> None:

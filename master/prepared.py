@@ -10,9 +10,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from master.errors import RunError, UsageError
 from master.interrupts import postponed
@@ -21,17 +19,8 @@ from master.scene import Scene
 COMMAND = (sys.executable, "-m", "master.prepare")
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """A scene ready to run: the FMU files by unit name, the parameters to set in each, and the equilibrium found."""
-
-    fmus: dict[str, Path]
-    parameters: dict[str, dict[str, Any]]
-    equilibrium: dict[str, Any]
-
-
-def prepare(scene: Scene, arguments: Sequence[str] = ()) -> Prepared:
-    """Have the scene prepared by the child process, called with `arguments`.
+def prepare(scene: Scene, arguments: Sequence[str] = ()) -> dict[str, Path]:
+    """FMU files by unit name of a scene, prepared by the child process, called with `arguments`.
 
     Raises UsageError for what the units refuse in the scene, RunError without an equilibrium or a child breaking off.
     """
@@ -55,5 +44,4 @@ def prepare(scene: Scene, arguments: Sequence[str] = ()) -> Prepared:
         raise RunError(f"preparing the scene broke off with exit code {child.returncode}") from None
     if "error" in answer:
         raise (UsageError if answer.get("exit") == 2 else RunError)(answer["error"])
-    fmus = {name: Path(path) for name, path in answer["fmus"].items()}
-    return Prepared(fmus, answer["parameters"], answer["equilibrium"])
+    return {name: Path(path) for name, path in answer["fmus"].items()}

@@ -90,10 +90,6 @@ class Table:
         """Several columns side by side, shape (steps + 1, len(names))."""
         return self.values[:, [self.names.index(name) for name in names]]
 
-    def ending(self, suffix: str) -> dict[str, np.ndarray]:
-        """Every column whose name ends in `suffix`."""
-        return {name: self.column(name) for name in self.names if name.endswith(suffix)}
-
     @property
     def header(self) -> str:
         """First line of the CSV file."""

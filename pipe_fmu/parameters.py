@@ -208,9 +208,11 @@ class PipeParameters:
     def _check_nodes(self) -> None:
         at = self.nodes_at
         if len(at) != self.nodes:
-            raise ValueError(f"nodes = {self.nodes}: must be the number of entries of nodes_at, {len(at)}")
+            rule = f"must be the number of entries of nodes_at, {len(at)}; an empty one places the nodes anew"
+            raise ValueError(f"nodes = {self.nodes}: {rule}")
         if at[0] != 0.0 or at[-1] != self.length or any(b <= a for a, b in pairwise(at)):
-            raise ValueError(f"nodes_at = ({at[0]:g}, ..., {at[-1]:g}): must ascend from 0 to the length {self.length:g} m")
+            rule = f"must ascend from 0 to the length {self.length:g} m; an empty one places the nodes anew"
+            raise ValueError(f"nodes_at = ({at[0]:g}, ..., {at[-1]:g}): {rule}")
 
     @property
     def all_sections(self) -> tuple[Section, ...]:

@@ -21,7 +21,7 @@ class Pipe:
         self.parameters = model.resolve(parameters)
         self.s, self.line = model.discretize(self.parameters)
         self.water = model.waters(self.parameters)
-        self.wall = recovery.wall(parameters, self.s)
+        self.walls = recovery.walls(parameters, self.s)
 
     def equilibrium(self, top: tuple[float, float, float], attitude: Array | None, time: float = 0.0) -> Equilibrium:
         """Static equilibrium with the top at `top` (3,) [m], e, its section at `attitude` (4,), or as it hangs if None."""
@@ -48,7 +48,7 @@ class Pipe:
         return integrator.energy_of(self.line, state)
 
     def section_forces(self, state: PipeState) -> SectionForces:
-        """Section forces at the nodes, material components."""
+        """Section forces at the nodes, material components, without those of damping."""
         water = self.water(state.time)
         wrenches = recovery.nodal_wrenches(self.line, water, state.position, state.quaternion, state.velocity, state.strain)
         return SectionForces.of(wrenches)
@@ -60,11 +60,11 @@ class Pipe:
 
     def von_mises(self, state: PipeState, forces: SectionForces) -> Array:
         """Largest von Mises stress (n,) [Pa] over the wall at every node."""
-        return recovery.von_mises(self.wall, state.position, forces)
+        return recovery.von_mises(self.walls, state.position, forces)
 
     def wall_tension(self, state: PipeState, forces: SectionForces) -> Array:
-        """Force (n,) [N] in the wall at every node."""
-        return recovery.wall_tension(self.wall, state.position, forces)
+        """Force (n,) [N] in the wall at every node, at a joint in that of the section below."""
+        return recovery.wall_tension(self.walls[0], state.position, forces)
 
     def largest_bending_moment(self, forces: SectionForces) -> float:
         """Largest bending moment [N m] along the line, between the nodes too."""

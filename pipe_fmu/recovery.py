@@ -3,6 +3,9 @@
 A two-node element knows its section force only in the mean. What it hands to its node, less its own share of the distributed loads, is
 the section force at the node to the accuracy of the reactions; the elements left and right of a node are averaged. Tension is the effective
 tension; the wall's own, T_w = T - p_e A_e + p_i A_i, enters the stress.
+
+They follow from the elastic strains at an instant. Internal and numerical damping act on the means over a step: the mean force and moment
+at the top contain them, the section forces here, and with them the force and moment at the top at the end of a step, do not.
 """
 
 import math
@@ -23,6 +26,7 @@ from .so3 import apply_transposed, matrix
 from .static_kernel import attitude, chord
 
 _SAMPLES = 16  # parts of an element
+_AT_JOINT = 1e-9  # m; so near to the end of a section a node stands at its joint
 
 
 class SectionForces(NamedTuple):
@@ -63,7 +67,7 @@ def _largest_square(s, moment, shear):
 
 @kernel
 def nodal_wrenches(line, water, position, quaternion, velocity, strain):
-    """Section force and moment (n, 6) at the nodes, material components."""
+    """Section force and moment (n, 6) at the nodes, material components, without those of damping."""
     n = position.shape[0]
     out, positions = np.zeros((n, 6)), np.empty((3, room(n)))
     fill_straight(position, positions)
@@ -129,7 +133,7 @@ def centreline_length(line_length: Array, strain: Array) -> float:
 
 
 class Wall(NamedTuple):
-    """Tube wall at the nodes and pressures on it, for the stress; (n,) each. `area` is 0 where a section has no wall."""
+    """Tube wall on one side of the nodes and pressures on it; (n,) each. `area` is 0 where a section has no wall."""
 
     area: Array  # m2
     second_moment: Array  # m4
@@ -141,11 +145,15 @@ class Wall(NamedTuple):
     depth: float  # m
 
 
-def wall(parameters: PipeParameters, s: Array) -> Wall:
-    """Wall at the nodes `s` (n,)."""
+def walls(parameters: PipeParameters, s: Array) -> tuple[Wall, Wall]:
+    """Walls below and above the nodes `s` (n,): two at a joint of sections, elsewhere the same."""
+    return _wall(parameters, s - _AT_JOINT), _wall(parameters, s + _AT_JOINT)
+
+
+def _wall(parameters: PipeParameters, s: Array) -> Wall:
     environment = parameters.environment
     ends = np.cumsum([section.length or parameters.length for section in parameters.all_sections])
-    at = [parameters.all_sections[min(int(np.searchsorted(ends, x - 1e-9)), len(ends) - 1)] for x in s]
+    at = [parameters.all_sections[min(int(np.searchsorted(ends, x)), len(ends) - 1)] for x in s]
     columns = [
         (
             one.steel_area if one.wall_thickness is not None else 0.0,
@@ -160,21 +168,22 @@ def wall(parameters: PipeParameters, s: Array) -> Wall:
 
 
 def wall_tension(wall: Wall, position: Array, forces: SectionForces) -> Array:
-    """Force (n,) [N] in the wall: effective tension - p_e A_e + p_i A_i. Nodes of sections without a wall have the effective tension."""
+    """Force (n,) [N] in `wall`: effective tension - p_e A_e + p_i A_i. Nodes of sections without a wall have the effective tension."""
     out = np.empty(len(wall.area))
     _wall_tension(wall, position, forces.tension, out)
     return out
 
 
-def von_mises(wall: Wall, position: Array, forces: SectionForces) -> Array:
+def von_mises(walls: tuple[Wall, Wall], position: Array, forces: SectionForces) -> Array:
     """Largest von Mises stress (n,) [Pa] over the wall of a tube at every node: tension, bending, torsion and water pressure.
 
-    Thick-walled tube (Lame) under the pressure outside and, where the pipe is filled, the head of its contents inside. Nodes of sections
-    without a wall have stress 0.
+    Thick-walled tube (Lame) under the pressure outside and, where the pipe is filled, the head of its contents inside. A node at a joint
+    of sections has that of the worse. Nodes of sections without a wall have stress 0.
     """
-    out = np.empty(len(wall.area))
-    _von_mises(wall, position, forces.tension, forces.moment, out)
-    return out
+    out = np.empty((2, len(position)))
+    for side, wall in enumerate(walls):
+        _von_mises(wall, position, forces.tension, forces.moment, out[side])
+    return out.max(axis=0)
 
 
 @inner

@@ -63,8 +63,8 @@ class PipeUnit:
             "moment": (3, "N.m", f"moment {_PULL}, mean over the step"),
             "force_change": (3, "N", f"force {_PULL}, mean over the step, less reference_force"),
             "moment_change": (3, "N.m", f"moment {_PULL}, mean over the step, less reference_moment"),
-            "end_force": (3, "N", f"force {_PULL}, at the end of the step"),
-            "end_moment": (3, "N.m", f"moment {_PULL}, at the end of the step"),
+            "end_force": (3, "N", f"force {_PULL}, at the end of the step, without damping"),
+            "end_moment": (3, "N.m", f"moment {_PULL}, at the end of the step, without damping"),
             "top_velocity": (3, "m/s", "velocity of the top, mean over the step, in e"),
             "top_angular_velocity": (3, "rad/s", "angular velocity of the top, mean over the step, in e"),
             "top_position": (3, "m", "position of the top, in e"),
@@ -90,10 +90,10 @@ class PipeUnit:
             "newton_residual": (1, "1", "residual of the last step over the largest element force"),
             "s": (n, "m", "arc length of the nodes"),
             "node_position": (3 * n, "m", "positions of the nodes, in e"),
-            "node_tension": (n, "N", "effective tension at the nodes"),
+            "node_tension": (n, "N", "effective tension at the nodes, without damping"),
             "node_wall_tension": (n, "N", "force in the wall at the nodes: effective tension less that of the pressures"),
-            "node_moment": (3 * n, "N.m", "torque and bending moments at the nodes, material components"),
-            "node_shear": (2 * n, "N", "shear forces at the nodes, material components"),
+            "node_moment": (3 * n, "N.m", "torque and bending moments at the nodes, without damping, material components"),
+            "node_shear": (2 * n, "N", "shear forces at the nodes, without damping, material components"),
         }
         return ports
 

@@ -84,7 +84,7 @@ class StillDrive:
 def still(monkeypatch):
     def arrange(fate="nothing"):
         monkeypatch.setattr(run, "prepare", lambda scene: None)
-        monkeypatch.setattr(run, "open_drive", lambda sections, prepared: nullcontext(StillDrive(fate)))
+        monkeypatch.setattr(run, "open_drive", lambda sections, fmus: nullcontext(StillDrive(fate)))
 
     return arrange
 

@@ -3,16 +3,16 @@
 import json
 import re
 import time
-from dataclasses import replace
+import zipfile
 
 import numpy as np
 import pytest
 
-from master import drive, scene
+from master import commands, drive, scene
 from master.__main__ import main
 from master.bond import FmuEnd, mobility_end
 from master.drive import open_drive
-from master.fmu import Fmu
+from master.fmu import Fmu, FmuFailed
 from master.ledger import EnergyCheckFailed
 from master.prepared import prepare
 
@@ -132,17 +132,56 @@ def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
     assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in EXPORTED]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(EXPORTED)
     loaded = scene.load("paper")
-    exported = replace(prepare(loaded), fmus={name: tmp_path / f"{name}.fmu" for name in ("pipe", "vessel")})
+    exported = {name: tmp_path / f"{name}.fmu" for name in ("pipe", "vessel")}
     with open_drive(loaded.sections, exported) as moving:
         gap = drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
         assert max(gap.values()) < 1e-9
+
+
+def test_an_export_leaves_nothing_of_another_scenes_and_an_interrupted_one_nothing_of_its_own(tmp_path, monkeypatch, capsys):
+    for name in (*EXPORTED, "mine.fmu"):
+        (tmp_path / name).write_text("old")
+
+    def interrupted(fmus, folder, *_):
+        assert all(path.parent == folder and path.is_file() for path in fmus.values())
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(commands, "write_system", interrupted)
+        assert main(["export", "-o", str(tmp_path)]) == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*EXPORTED, "mine.fmu"])
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"old"}
+    capsys.readouterr()
+    assert main(["export", "--scene", "heave", "-o", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.split() == [str(tmp_path / "pipe.fmu")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.fmu", "pipe.fmu"]
+    assert zipfile.is_zipfile(tmp_path / "pipe.fmu")
+
+
+@pytest.mark.parametrize("damping", ["internal", "numerical"])
+def test_a_damping_that_the_pipe_has_no_output_for_is_refused(damping):
+    """Its energy would be missing from the balance."""
+    with Fmu(prepare(scene.load("paper"))["pipe"], "pipe") as pipe:
+        reason = f"^pipe: initialisation: {damping}_damping: adds the output {damping}_dissipation; such an FMU must be exported anew$"
+        with pytest.raises(FmuFailed, match=reason):
+            pipe.initialize({f"{damping}_damping": 0.05})
+
+
+def test_an_exported_pipe_of_another_length_gets_new_nodes_where_its_own_are_dropped():
+    exported = prepare(scene.load("paper"))["pipe"]
+    with Fmu(exported, "pipe") as pipe, pytest.raises(FmuFailed, match=r"length 1210 m; an empty one places the nodes anew"):
+        pipe.initialize({"length": 1210.0})
+    with Fmu(exported, "pipe") as pipe:
+        pipe.initialize({"length": 1210.0, "nodes_at": "[]"})
+        assert pipe.get("s")[[0, -1]].tolist() == [0.0, 1210.0]
+        assert pipe.get("pipe_length")[0] == pytest.approx(1210.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("unit", ["pipe", "vessel"])
 def test_a_rollback_is_bitwise_and_cheap(unit):
     """All outputs, after a live and after a serialised state; saving, restoring and freeing cost less than half a step."""
     loaded = scene.load("paper", BUSY)
-    fmu_file = prepare(loaded).fmus[unit]
+    fmu_file = prepare(loaded)[unit]
     with Fmu(fmu_file, unit) as fmu:
         fmu.initialize()
         flows = ("velocity", "angular_velocity") if unit == "pipe" else ("force", "moment")

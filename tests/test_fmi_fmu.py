@@ -5,7 +5,9 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,7 +17,9 @@ import pytest
 from fmpy.validation import validate_fmu
 from units.toys import BODY, SPRING, build_pair, spring_recipe
 
-from master.fmi.build import Recipe, build_fmu, bundled_package, cached_fmu
+from master.errors import RunError
+from master.fmi import licenses
+from master.fmi.build import Recipe, build_fmu, bundled_package, cache_folder, cached_fmu
 from master.fmi.description import base_unit
 from master.fmu import Fmu, FmuError, FmuFailed, StepFailed, StepRejected
 
@@ -330,12 +334,39 @@ def test_compiled_kernels_are_found_again_and_the_process_survives_every_refusal
     assert [run.stderr for run in runs] == ["", ""]
 
 
-def test_an_unwritable_cache_is_no_obstacle(files, tmp_path):
+@pytest.mark.parametrize("home", [True, False])
+def test_an_unwritable_cache_is_no_obstacle_and_builder_and_fmu_go_to_the_same_place(files, tmp_path, monkeypatch, home):
+    """A file in the way, of the whole place or of one kind of files: root may write to what is read-only."""
+    (tmp_path / "cache").mkdir()
+    (tmp_path / "cache" / "units").write_text("in the way")
     (tmp_path / "file").write_text("in the way")
-    environment = {**os.environ, "PIPELAY_CACHE": str(tmp_path / "file"), "HOME": str(tmp_path / "home")}
-    done = subprocess.run([sys.executable, "-c", PROGRAM, str(files[0])], env=environment, capture_output=True, text=True)
+    monkeypatch.setenv("PIPELAY_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("HOME", str(tmp_path / ("home" if home else "file")))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)  # to be found anew
+    done = subprocess.run([sys.executable, "-c", PROGRAM, str(files[0])], capture_output=True, text=True)
     assert done.returncode == 0
-    assert str(tmp_path / "home" / ".cache" / "pipelay") in done.stdout
+    place = tmp_path / "home" / ".cache" / "pipelay" if home else tmp_path / f"pipelay-{os.getuid()}"
+    assert str(place / "units") in done.stdout
+    assert cache_folder("units") == place / "units"
+    assert cache_folder("fmus") == tmp_path / "cache" / "fmus"
+
+
+def test_a_portable_fmu_without_compiled_kernels_is_not_made(folder):
+    with pytest.raises(RunError, match="--portable: Body left no compiled kernels"):
+        build_fmu(replace(BODY, portable=True), folder / "portable.fmu")
+    assert not (folder / "portable.fmu").exists()
+
+
+def test_licence_files_are_taken_and_modules_of_such_a_name_are_not(tmp_path, monkeypatch):
+    texts = {"notched/licenses.py": "", "notched/NOTICE.txt": "seen", "notched-1.dist-info/licenses/LICENSE": "free",
+             "notched-1.dist-info/METADATA": "Name: notched\nVersion: 1\n"}  # fmt: skip
+    for name, text in (texts | {"notched-1.dist-info/RECORD": "".join(f"{name},,\n" for name in texts)}).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    taken = {path.rpartition("/")[2]: text for path, text in licenses.of_package("notched").items()}
+    assert taken == {"notched_NOTICE.txt": b"seen", "notched-1.dist-info_licenses_LICENSE": b"free"}
 
 
 def test_building_and_running_in_one_process_leaves_the_import_path_alone(folder):

@@ -14,7 +14,7 @@ from hosts import NotHereError, error, exchange, install, reference, residual, r
 from run_host import own
 
 from master.__main__ import main
-from master.fmi.system import ECCO, PORTS
+from master.fmi.system import PORTS, osp_structure
 
 END = 6.0  # s
 STEPS = (0.05, 0.01)  # s
@@ -107,10 +107,16 @@ def test_ecco_does_the_parallel_exchange_in_steps_of_its_choice(host, hosted, tm
     files = export(tmp_path_factory.mktemp("held"), "paper", HELD)
     rows, exact = hosted(host, files, STEPS[0]), reference("paper", HELD, 0.01, END)
     np.testing.assert_allclose(rows[:, 1:], exchange(files, rows[:, 0])[:, 1:], rtol=ROUND_OFF, atol=ROUND_OFF)
-    steps, longest = np.diff(rows[:, 0]), ECCO["MaximumStepSize"]
-    assert ECCO["MinimumStepSize"] - 1e-8 < steps.min()
+    steps, longest = np.diff(rows[:, 0]), 0.1  # the scene's macro_step
+    assert steps.min() > 0.005 - 1e-8
     assert steps.max() < longest + 1e-8
     assert error(rows, exact) < error(exchange(files, steps_of(longest)), exact) + ROUND_OFF
+
+
+@pytest.mark.parametrize(("macro_step", "shortest"), [(0.1, 0.005), (0.5, 0.025)])
+def test_the_steps_of_ecco_end_at_the_macro_step(macro_step, shortest):
+    found = osp_structure({}, macro_step, bond=0).find("EccoConfiguration")
+    assert [float(found.findtext(f"{name}StepSize")) for name in ("", "Minimum", "Maximum")] == [macro_step, shortest, macro_step]
 
 
 def test_libcosim_connects_the_mechanical_ports_as_such(hosted, exported, exchanged, tmp_path):

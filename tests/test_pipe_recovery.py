@@ -130,6 +130,19 @@ def test_pressure_alone_gives_the_stress_of_a_capped_tube():
     np.testing.assert_allclose(got, math.sqrt(3) * pressure * b * b / (b * b - a * a), rtol=1e-10, atol=1e-3)
 
 
+@pytest.mark.parametrize("walls", [(0.040, 0.012), (0.012, 0.040)])
+def test_stress_at_a_joint_is_that_of_the_thin_wall_on_either_side(walls):
+    sections = tuple(replace(P16, length=length, wall_thickness=wall) for length, wall in zip((500.0, 700.0), walls, strict=True))
+    pipe, _, state = started(PipeParameters(sections=sections, top="pinned", top_quaternion=HANGING))
+    n, joint = len(pipe.s), int(np.argmin(np.abs(pipe.s - 500.0)))
+    forces = SectionForces(np.full(n, 4e5), np.zeros((n, 2)), np.tile([2e4, 1e5, -5e4], (n, 1)))
+    outside = 1025 * 9.81 * (800.0 + state.position[joint, 2])
+    b = 0.4064 / 2
+    by_hand = [stress_by_hand(4e5, math.hypot(1e5, 5e4), 2e4, outside, 0.0, b - wall, b, math.pi * b * b) for wall in walls]
+    assert max(by_hand) == by_hand[int(np.argmin(walls))]
+    assert pipe.von_mises(state, forces)[joint] == pytest.approx(max(by_hand), rel=1e-10)
+
+
 def test_forces_at_the_end_of_a_step_follow_the_mean_over_the_steps_around_it():
     """A moving line: the end wrench between two mean wrenches, to 1 % of the swing."""
     pipe, _, start = started(clamped("P16", None))

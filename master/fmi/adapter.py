@@ -30,7 +30,7 @@ from pythonfmu.enums import Fmi2Status
 from . import schema
 from .description import Variable, fill
 from .failure import Refused, guarded, printable, where
-from .ports import KINDS, Ports, Run
+from .ports import KINDS, Ports, PortTable, Run
 
 CONFIGURATION = "configuration"
 START = "start."  # before the name of a parameter that has the name of a port, whose start value it is
@@ -275,8 +275,14 @@ class UnitSlave(Fmi2Slave):
         text = changes.pop(CONFIGURATION, "")
         tree = schema.from_json(self.unit_class.PARAMETERS, text) if text else self.parameters
         tree = schema.override(tree, {self._fields[name]: value for name, value in changes.items()})
-        given = self.unit_class.outputs(tree)
-        for name, port in self.ports.outputs.items():
-            if name not in given or given[name][0] != port[0]:
-                raise Refused(f"{CONFIGURATION}: changes the output {name}; such an FMU must be exported anew")
+        self._expect_outputs(self.unit_class.outputs(tree))
         return self.unit_class(tree)
+
+    def _expect_outputs(self, given: PortTable) -> None:
+        """An energy that the FMU has no output for would be missing from the balance, unseen."""
+        there = self.ports.outputs
+        for name in {**there, **given}:
+            if name not in there or name not in given or given[name][0] != there[name][0]:
+                cause = ", ".join(key for key, value in self.changed.items() if value != self.ports.parameters[key].value)
+                verb = "changes" if name in there else "adds"
+                raise Refused(f"{cause}: {verb} the output {name}; such an FMU must be exported anew")

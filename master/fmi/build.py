@@ -29,7 +29,7 @@ from xml.etree import ElementTree
 from pythonfmu import FmuBuilder
 
 from ..errors import RunError
-from . import licenses, loader, portable
+from . import entry, licenses, loader, portable
 from .document import icon_png, page_html
 from .portable import EPOCH
 
@@ -84,8 +84,8 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
     """
     destination.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="fmu_") as folder, _clean_imports():
-        entry, configuration = Path(folder, f"{recipe.bundle}_entry.py"), Path(folder, "fmu.json")
-        shutil.copy(HERE / "entry.py", entry)
+        script, configuration = Path(folder, f"{recipe.bundle}_entry.py"), Path(folder, "fmu.json")
+        shutil.copy(HERE / "entry.py", script)
         about = {**_about(recipe), "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, recipe.digest))}
         content = {"about": about, "parameters": recipe.parameters, "experiment": dict(recipe.experiment), "inputs": dict(recipe.inputs)}
         configuration.write_text(json.dumps(content, indent=1), encoding="utf-8")
@@ -94,7 +94,7 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
             target = bundle / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(text)
-        raw = FmuBuilder.build_FMU(entry, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **CAPABILITIES)
+        raw = FmuBuilder.build_FMU(script, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **CAPABILITIES)
         finished = destination.with_name(f".{os.getpid()}_{destination.name}")
         _finish(recipe, Path(raw), finished)
         finished.replace(destination)
@@ -102,15 +102,11 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
 
 
 def cache_folder(kind: str) -> Path:
-    """Where files of a kind are kept by content: in $PIPELAY_CACHE, else ~/.cache/pipelay. Raises RunError."""
-    chosen = os.environ.get("PIPELAY_CACHE")
-    for place in (Path(chosen) if chosen else Path.home() / ".cache" / "pipelay", Path(tempfile.gettempdir()) / "pipelay"):
-        try:
-            (place / kind).mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        return place / kind
-    raise RunError("no folder can be written for the FMUs; set PIPELAY_CACHE to one that can")
+    """Where files of a kind are kept by content, as `entry` has it for FMUs. Raises RunError."""
+    folder = next(entry.cache_folders(kind), None)
+    if folder is None:
+        raise RunError("no folder can be written for the FMUs; set PIPELAY_CACHE to one that can")
+    return folder
 
 
 def cached_fmu(recipe: Recipe, folder: Path) -> Path:
@@ -139,8 +135,8 @@ def bundled_package(fmu: Path) -> ModuleType:
         archive.extractall(folder, [name for name in archive.namelist() if name.startswith("resources/")])
         resources = Path(folder, "resources")
         sys.path.insert(0, str(resources))
-        entry = importlib.import_module((resources / "slavemodule.txt").read_text())
-        return sys.modules[entry.PACKAGE]
+        slave = importlib.import_module((resources / "slavemodule.txt").read_text())
+        return sys.modules[slave.PACKAGE]
 
 
 def _about(recipe: Recipe) -> dict[str, str]:
@@ -191,7 +187,10 @@ def _finish(recipe: Recipe, raw: Path, finished: Path) -> None:
     contents |= licenses.of_package("pipelay") | licenses.of_package("pythonfmu")
     contents["resources/python.txt"] = sys.executable.encode()
     if recipe.portable:
-        contents |= _kernels(recipe, contents)
+        if not (compiled := _kernels(recipe, contents)):
+            place = cache_folder("units")
+            raise RunError(f"--portable: {recipe.name} left no compiled kernels in {place}; NUMBA_CACHE_DIR must not be set")
+        contents |= compiled
         shutil.copy(portable.archive(cache_folder("runtimes")), finished)
     with zipfile.ZipFile(finished, "a") as target:
         for name in sorted(contents):

@@ -21,7 +21,7 @@ def of_package(name: str) -> dict[str, bytes]:
     return {
         f"{FOLDER}/{name}/{str(file).replace('/', '_')}": Path(str(file.locate())).read_bytes()
         for file in files
-        if _LICENSE.match(file.name) and file.suffix != ".pyc"
+        if _LICENSE.match(file.name) and file.suffix not in (".py", ".pyc")
     }
 
 

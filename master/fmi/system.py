@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .description import base_unit, scalar_names
 
@@ -25,9 +25,10 @@ SSD, SSC = "http://ssp-standard.org/SSP1/SystemStructureDescription", "http://ss
 OSP_SYSTEM = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 OSP_MODEL = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
 ECCO_BOND = 0  # surge, where the vessel's positioning moves the pipe
+ECCO_RANGE = 20.0  # longest step over the shortest
 ECCO = {
-    "SafetyFactor": 0.99, "MinimumStepSize": 0.005, "MaximumStepSize": 0.1, "MinimumChangeRate": 0.2, "MaximumChangeRate": 1.5,
-    "ProportionalGain": 0.2, "IntegralGain": 0.15, "RelativeTolerance": 1e-3, "AbsoluteTolerance": 0.1,
+    "SafetyFactor": 0.99, "MinimumChangeRate": 0.2, "MaximumChangeRate": 1.5, "ProportionalGain": 0.2, "IntegralGain": 0.15,
+    "RelativeTolerance": 1e-3, "AbsoluteTolerance": 0.1,
 }  # fmt: skip
 
 
@@ -65,15 +66,20 @@ PORTS = {  # unit -> (port element of the OSP, name, its effort and flow: elemen
 }
 
 
+SSP, OSP, OSP_ECCO = "system.ssp", "OspSystemStructure.xml", "OspSystemStructure_ecco.xml"
+OSP_MODELS = {name: f"{name.capitalize()}_OspModelDescription.xml" for name in PORTS}  # the OSP wants the FMI model name before it
+EXPORTED = (*(f"{name}.fmu" for name in PORTS), SSP, OSP, OSP_ECCO, *OSP_MODELS.values())
+
+
 def write_system(fmus: Mapping[str, Path], folder: Path, macro_step: float, duration: float) -> list[Path]:
     """system.ssp, the two OSP structures and the models' port descriptions for the FMUs `pipe` and `vessel`; step and end in s."""
     structure = structure_description(duration)
     files = {
-        "OspSystemStructure.xml": osp_structure(fmus, macro_step),
-        "OspSystemStructure_ecco.xml": osp_structure(fmus, macro_step, ECCO_BOND),
+        OSP: osp_structure(fmus, macro_step),
+        OSP_ECCO: osp_structure(fmus, macro_step, ECCO_BOND),
     }
-    files |= {f"{_model_name(path)}_OspModelDescription.xml": osp_model(name) for name, path in fmus.items()}
-    written = [folder / "system.ssp"]
+    files |= {OSP_MODELS[name]: osp_model(name) for name in fmus}
+    written = [folder / SSP]
     with zipfile.ZipFile(written[0], "w") as archive:
         archive.writestr("SystemStructure.ssd", _text(structure), zipfile.ZIP_DEFLATED)
         for name, path in fmus.items():
@@ -129,7 +135,8 @@ def osp_structure(fmus: Mapping[str, Path], macro_step: float, bond: int | None 
                 SubElement(connection, "Variable", {"simulator": unit, "name": name} | ({"causality": causality} if bonded else {}))
     if bond is not None:
         parameters = SubElement(root, "EccoConfiguration")
-        for name, value in {"StepSize": macro_step, **ECCO}.items():
+        steps = {"StepSize": macro_step, "MinimumStepSize": macro_step / ECCO_RANGE, "MaximumStepSize": macro_step}
+        for name, value in {**steps, **ECCO}.items():
             SubElement(parameters, name).text = repr(value)
     return root
 
@@ -153,11 +160,6 @@ def osp_model(unit: str) -> Element:
 
 def _scalars(wire: Wire) -> Iterator[tuple[str, str]]:
     return zip(scalar_names(wire.output, 3), scalar_names(wire.input, 3), strict=True)
-
-
-def _model_name(fmu: Path) -> str:
-    with zipfile.ZipFile(fmu) as archive:
-        return fromstring(archive.read("modelDescription.xml")).get("modelName", "")
 
 
 def _text(root: Element) -> bytes:
