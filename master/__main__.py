@@ -20,6 +20,7 @@ EPILOG = """examples:
   pipelay statics paper --json                 the equilibrium alone, as JSON
   pipelay export -o fmus --scene pipelay       pipe.fmu and vessel.fmu for any FMI 2.0 master
   pipelay scenes                               what is built in
+  pipelay keys                                 what a scene may say
 
 exit codes: 0 done and the energy check kept; 1 the computation failed or the energy check did; 2 a mistake in the call
 or the scene, named in one line."""
@@ -66,7 +67,10 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--portable", action="store_true", help=portable)
 
     command(
-        "scenes", "List the built-in scenes.", "Their files are in the package's folder master/scenes."
+        "scenes", "List the built-in scenes.", "Copy one of their files for a scene of your own; `pipelay keys` lists what it may say."
+    )
+    command(
+        "keys", "List what a scene of pipe and vessel may say: keys, defaults, units.", "Lists of tables have [] behind their names."
     )
     stability = command(
         "stability",

@@ -81,6 +81,15 @@ def scenes(options: argparse.Namespace) -> int:
     width = max(map(len, found))
     for name, title in found.items():
         _say(f"{name:{width}}  {title}")
+    _say(f"files in {scenes_of.BUILT_IN}")
+    return 0
+
+
+def keys(options: argparse.Namespace) -> int:
+    """List what a scene may say."""
+    from master.keys import listing
+
+    _say(listing())
     return 0
 
 

@@ -58,13 +58,15 @@ class Simulation(Section):
 
 @dataclass(frozen=True)
 class Coupling(Section):
-    """[coupling]: the macro step and the energy check."""
+    """[coupling]: how the units are coupled, and the energy check."""
 
-    scheme: Literal["energy-consistent", "serial", "parallel"] = "energy-consistent"
+    scheme: Literal["energy-consistent", "serial", "parallel"] = field(
+        default="energy-consistent", metadata={"doc": "how the two units are coupled"}
+    )
     tolerance: float = _number("energy the bond may make in a step, relative", "1", above=0.0, below=1.0, default=1e-9)
     energy_check: float = _number("limit of closure and of what the bond makes, over what is exchanged", "1", above=0.0, default=1e-8)
-    on_violation: Literal["stop", "refine", "warn"] = "stop"
-    rollback: bool = True
+    on_violation: Literal["stop", "refine", "warn"] = field(default="stop", metadata={"doc": "what a failed energy check does"})
+    rollback: bool = field(default=True, metadata={"doc": "whether steps may be taken back; else units are solved once a step"})
 
     def __post_init__(self) -> None:
         super().__post_init__()

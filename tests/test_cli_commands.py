@@ -7,12 +7,14 @@ import signal
 import subprocess
 import sys
 from contextlib import nullcontext, suppress
+from dataclasses import fields
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from master import prepared, run
+from master import keys, prepared, run
 from master.__main__ import main
 from master.drive import Effort, pose_gap, top_tension
 from master.fmu import FmuFailed, StepRejected
@@ -190,6 +192,17 @@ def test_a_refused_scene_leaves_no_folder_behind(tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
+def test_the_keys_listed_are_those_that_a_scene_may_say(capsys):
+    assert main(["keys"]) == 0
+    names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert len(set(names)) == len(names)
+    assert {"pipe.length", "pipe.section.wall_thickness", "vessel.controller.x", "environment.current.velocity"} <= set(names)
+    for table, filled in keys.FILLED_IN.items():
+        own = {field.name for field in fields(keys.TABLES[table])}
+        listed = {name.split(".")[1].removesuffix("[]") for name in names if name.startswith(f"{table}.")}
+        assert own - listed == set(filled)
+
+
 @pytest.mark.parametrize("arguments", [[], ["simulate"], ["run", "--sett", "a=1"]])
 def test_a_wrong_call_is_refused_by_the_parser_with_exit_code_2(arguments, capsys):
     with pytest.raises(SystemExit) as caught:
@@ -206,14 +219,11 @@ def test_help_teaches(arguments, capsys):
     assert "pipelay" in capsys.readouterr().out
 
 
-def test_scenes_lists_one_line_each(capsys):
+def test_scenes_lists_one_line_each_and_where_their_files_are(capsys):
     assert main(["scenes"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [
-        "free-decay",
-        "heave",
-        "paper",
-        "pipelay",
-    ]
+    *lines, last = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["free-decay", "heave", "paper", "pipelay"]
+    assert (Path(last.removeprefix("files in ")) / "paper.toml").is_file()
 
 
 def test_the_module_runs_as_a_program_and_bears_a_closed_pipe():

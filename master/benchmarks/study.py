@@ -43,7 +43,7 @@ def _line(name: str, folder: Path, tick: Tick) -> tuple[Rows, list[str], list[Li
     draw(folder / f"{name}.png", f"{name}: CPU time against error", whole, line.KEYS[0], "Position error, rms over time [m]", bound[0])
     words = [f"  uncertainty of the reference: {bound[0]:.1e} m, {bound[1]:.1e} N, {bound[2]:.1e} N m (rms)"]
     if missing := line.missing():
-        words.append(f"  not installed, so left out: {', '.join(missing)} (pip install 'pipelay[bench]')")
+        words.append(f"  not installed, so left out: {', '.join(missing)} (pip install '.[bench]')")
     return rows, words, [Limit(*one, least=True) for one in line.verdicts(name, rows)]
 
 
