@@ -146,7 +146,7 @@ class PipeParameters:
     length: float = number(1200.0, "m", "unstretched length L", above=0.0)
     nodes: int = number(48, "1", "number of nodes", min=3, max=100000)
     tolerance: float | None = number(
-        None, "1", "relative error allowed in tension and bending moments at rest, instead of nodes", min=1e-6, max=0.1
+        None, "1", "relative error allowed in tension and bending moments at rest; overrides `nodes`", min=1e-6, max=0.1
     )
     mesh: Literal["adapted", "uniform"] = field(default="adapted", metadata={"doc": "elements adapted to the equilibrium, or equal"})
     nodes_at: tuple[float, ...] = number((), "m", "arc lengths of the nodes; empty: placed as `mesh` says", min=0.0)
