@@ -65,7 +65,7 @@ class LinearDamping:
         check_fields(self)
         if np.linalg.eigvalsh(symmetric_matrix(self))[0] < -1e-12 * max(getattr(self, mode) for mode in MODES):
             name = largest_coupling(self)
-            raise ValueError(f"{name} = {getattr(self, name):g}: must leave the damping matrix positive semidefinite, with the others")
+            raise ValueError(f"{name} = {getattr(self, name):g}: must leave the damping positive semidefinite, with the other entries")
 
 
 @dataclass(frozen=True)
