@@ -13,6 +13,7 @@ from typing import Any
 from master import scene as scenes_of
 from master.errors import RunError, UsageError
 from master.fmi.system import EXPORTED, write_system
+from master.folders import gone_if_empty
 from master.interrupts import postponed
 from master.prepared import prepare
 
@@ -47,16 +48,17 @@ def export(options: argparse.Namespace) -> int:
     """Write the FMUs of a scene, and the files that connect them, into a folder: all or none, instead of those of another export."""
     scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     folder = _folder(options.output)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        unfinished = tempfile.TemporaryDirectory(prefix=".pipelay_", dir=folder)
-    except OSError as error:
-        raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-    with unfinished as place:
-        fmus = prepare(scene, ["--export", place, *(["--portable"] if options.portable else [])])
-        simulation = scene.sections.simulation
-        joined = write_system(fmus, Path(place), simulation.macro_step, simulation.duration) if "vessel" in fmus else []
-        written = _moved([*fmus.values(), *joined], folder)
+    with gone_if_empty(folder):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            unfinished = tempfile.TemporaryDirectory(prefix=".pipelay_", dir=folder)
+        except OSError as error:
+            raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
+        with unfinished as place:
+            fmus = prepare(scene, ["--export", place, *(["--portable"] if options.portable else [])])
+            simulation = scene.sections.simulation
+            joined = write_system(fmus, Path(place), simulation.macro_step, simulation.duration) if "vessel" in fmus else []
+            written = _moved([*fmus.values(), *joined], folder)
     for path in written:
         _say(str(path))
     return 0

@@ -7,7 +7,6 @@ with it, signals.csv has every step before.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import tempfile
 import threading
@@ -24,6 +23,7 @@ from master import figures, post_mortem, report
 from master.bonded import open_bonded, signals
 from master.drive import Drive, open_drive
 from master.errors import RunError, UsageError
+from master.folders import gone_if_empty
 from master.interrupts import postponed
 from master.ledger import EnergyCheckFailed
 from master.prepared import prepare
@@ -57,7 +57,7 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
 
     Raises UsageError where the scene or the folder cannot be used, RunError where the run could not even start.
     """
-    with _scratch_folder(folder) as scratch:
+    with gone_if_empty(folder), _scratch_folder(folder) as scratch:
         with ExitStack() as stack:
             begun = clock.perf_counter()
             patience = _patience(screen)
@@ -153,20 +153,14 @@ def _move_into_place(scratch: Path, folder: Path) -> None:
 @contextmanager
 def _scratch_folder(folder: Path) -> Iterator[Path]:
     """A folder in `folder`, or beside it, for files in the making. Raises UsageError where none can be made."""
-    missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         prefix = post_mortem.scratch_prefix(os.getpid())
         scratch = tempfile.TemporaryDirectory(prefix=prefix, dir=folder if folder.is_dir() else folder.parent)
     except OSError as error:
         raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-    try:
-        with scratch as name:
-            yield Path(name)
-    finally:
-        for made in missing:
-            with contextlib.suppress(OSError):  # not empty: there are results
-                made.rmdir()
+    with scratch as name:
+        yield Path(name)
 
 
 def _progress(end: float, stream: TextIO) -> Any:

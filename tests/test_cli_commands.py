@@ -187,8 +187,10 @@ def test_a_mistake_is_one_line_on_the_error_stream_with_exit_code_2(arguments, n
     assert error.count("\n") == 1
 
 
-def test_a_refused_scene_leaves_no_folder_behind(tmp_path, capsys):
-    assert main(["run", "--set", "pipe.lenght=1", "-o", str(tmp_path / "a" / "b")]) == 2
+@pytest.mark.parametrize("command", ["run", "export"])
+def test_a_refused_scene_leaves_no_folder_behind(command, tmp_path, capsys):
+    assert main([command, "--set", "pipe.lenght=1", "-o", str(tmp_path / "a" / "b")]) == 2
+    assert "pipe.lenght = 1" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
