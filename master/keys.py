@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from master.sections import Coupling, Simulation, Start, Tables, TopMotion
+from master.scene import FOUND
+from master.sections import RULES, Coupling, Simulation, Start, Tables, TopMotion
 from pipe_fmu import PipeParameters
 from pipe_fmu.environment import Environment
 from vessel_fmu.parameters import VesselParameters
@@ -16,10 +17,6 @@ TABLES = {
     "simulation": Simulation, "environment": Environment, "start": Start, "pipe": PipeParameters, "vessel": VesselParameters,
     "coupling": Coupling, "top_motion": TopMotion, "tables": Tables,
 }  # fmt: skip
-FILLED_IN = {  # from other tables and from the statics
-    "pipe": ("environment", "top_position", "top_quaternion", "reference_force", "reference_moment"),
-    "vessel": ("environment", "start", "hold_force", "departure_angle", "departure_rotation"),
-}
 
 
 def listing() -> str:
@@ -33,7 +30,7 @@ def _rows(path: str, kind: Any) -> Iterator[tuple[str, str, str]]:
     hints = get_type_hints(kind)
     for item in fields(kind):
         hint, name = hints[item.name], f"{path}.{item.name}"
-        if item.name in FILLED_IN.get(path, ()):
+        if name in FOUND:
             continue
         inner = next((one for one in (hint, *get_args(hint)) if is_dataclass(one)), None)
         if name == "pipe.sections":
@@ -54,7 +51,6 @@ def _unit(item: Field[Any]) -> str:
 
 
 def _meaning(item: Field[Any], hint: Any) -> str:
-    signs = {"above": ">", "min": ">=", "below": "<", "max": "<="}
-    bounds = [f"{sign} {item.metadata[key]:g}" for key, sign in signs.items() if key in item.metadata]
+    bounds = [f"{sign} {item.metadata[key]:g}" for key, (sign, _) in RULES.items() if key in item.metadata]
     choices = [f"one of {', '.join(map(json.dumps, get_args(hint)))}"] if get_origin(hint) is Literal else []
     return "; ".join(text for text in (item.metadata.get("doc", ""), *bounds, *choices) if text)
