@@ -10,12 +10,13 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite, isqrt
+from math import isqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .fmi.ports import finite
 from .fmu import Fmu, Names, StepFailed
 
 Vector = NDArray[Any]
@@ -172,7 +173,7 @@ class FmuEnd:
         else:
             self._step(time, step, self._held, held)
         result = self.result()
-        if not _finite(result):
+        if not finite(result):
             raise self._broken(time, step)
         return result
 
@@ -185,7 +186,7 @@ class FmuEnd:
             return None
         self._step(time, step, (*self._held, self._yielding), np.concatenate([free, mobility.ravel()]))
         values = self.fmu.get(self._met)
-        if not _finite(values):
+        if not finite(values):
             raise self._broken(time, step)
         return values[free.size :], self._signs * values[: free.size]
 
@@ -226,10 +227,6 @@ class FmuEnd:
         if self._saved is not None:
             self.fmu.restore(self._saved)
             self.commit()
-
-
-def _finite(values: Vector) -> bool:
-    return isfinite(values @ values) or bool(np.isfinite(values).all())  # the first is quicker, the second knows of overflow
 
 
 def _several(names: Names) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """Contestants: our step, called in-process, and the pipe's FMU moved by the master.
 
-Steps longer than the time between the instants compared are interpolated by cubic splines."""
+Steps longer than the time between the instants compared are interpolated by cubic splines.
+"""
 
 from __future__ import annotations
 

@@ -17,6 +17,11 @@ PortTable = Mapping[str, tuple[int, str | Sequence[str], str]]  # name -> (size,
 Ranges = Mapping[str, tuple[float | None, float | None]]  # port -> least and largest value
 
 
+def finite(values: NDArray[np.float64]) -> bool:
+    """Whether all values (n,) are finite."""
+    return math.isfinite(values @ values) or bool(np.isfinite(values).all())  # the first is quicker, the second knows of overflow
+
+
 class Run(NamedTuple):
     """Consecutive value references that belong to one port (or one parameter)."""
 
@@ -83,7 +88,7 @@ class Ports:
 
     def not_finite(self, inputs: NDArray[np.float64]) -> str | None:
         """What to say of the first input that is not finite, if there is one."""
-        if math.isfinite(inputs @ inputs) or np.isfinite(inputs).all():  # the first is quicker, the second knows of overflow
+        if finite(inputs):
             return None
         bad = next(i for i, value in enumerate(inputs) if not math.isfinite(value))
         _, name, i = self.place(bad)
