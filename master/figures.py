@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from scipy.interpolate import CubicHermiteSpline
 
 from master.recorder import Shapes, Table
 
@@ -39,6 +40,7 @@ STYLE: Any = {
     "legend.frameon": False,
 }
 HANG_OFF = {"pipe.top_work": "pipe.hang-off", "vessel.bond_work": "vessel.hang-off", "mover.bond_work": "mover.pipe"}
+_PARTS = 8  # of an element, at whose ends a curve is drawn
 ARC_LENGTH = "Arc length from the foot S [m]"
 
 
@@ -93,16 +95,28 @@ def length(path: Path, signals: Table, reference: float) -> None:
         axes.margins(x=0)
 
 
-def along(path: Path, title: str, label: str, shapes: Shapes, field: np.ndarray, lower_envelope: bool) -> None:
-    """A quantity along the pipe at the start and at the end with its extremes over all recording instants."""
+def bending(shapes: Shapes) -> tuple[np.ndarray, np.ndarray]:
+    """Arc lengths (k,) [m], _PARTS to an element, and the bending moment (times, k) [N m] there.
+
+    Its square is the cubic with the slopes 2 (m_2 n_3 - m_3 n_2) of eq. (26) at the nodes.
+    """
+    part = np.arange(_PARTS) / _PARTS
+    s = np.append((shapes.s[:-1, None] + np.diff(shapes.s)[:, None] * part).ravel(), shapes.s[-1])
+    (m2, m3), (n2, n3) = shapes.moment[..., 1:].transpose(2, 0, 1), shapes.shear.transpose(2, 0, 1)
+    square = CubicHermiteSpline(shapes.s, m2**2 + m3**2, 2.0 * (m2 * n3 - m3 * n2), axis=1)(s)
+    return s, np.sqrt(np.maximum(square, 0.0))  # where it passes through 0 the cubic may dip below
+
+
+def along(path: Path, title: str, label: str, time: np.ndarray, s: np.ndarray, field: np.ndarray, lower_envelope: bool) -> None:
+    """A quantity (times, k) along the pipe at the start and at the end with its extremes over all recording instants."""
     with _figure(path, title) as figure:
         axes = figure.subplots()
         extremes = "largest, smallest over time" if lower_envelope else "largest over time"
-        axes.plot(shapes.s, field.max(axis=0) / 1e3, **DOTS, label=extremes)
+        axes.plot(s, field.max(axis=0) / 1e3, **DOTS, label=extremes)
         if lower_envelope:
-            axes.plot(shapes.s, field.min(axis=0) / 1e3, **DOTS)
-        axes.plot(shapes.s, field[0] / 1e3, **INITIAL_LINE, label=_seconds(shapes.time[0]))
-        axes.plot(shapes.s, field[-1] / 1e3, **FINAL_LINE, label=_seconds(round(shapes.time[-1], 6)))
+            axes.plot(s, field.min(axis=0) / 1e3, **DOTS)
+        axes.plot(s, field[0] / 1e3, **INITIAL_LINE, label=_seconds(time[0]))
+        axes.plot(s, field[-1] / 1e3, **FINAL_LINE, label=_seconds(round(time[-1], 6)))
         axes.set(xlabel=ARC_LENGTH, ylabel=label)
         axes.margins(x=0.01)
         axes.legend()
@@ -190,16 +204,15 @@ def draw_all(
         function(files[-1], *arguments)
 
     if shapes is not None:
-        norm_moment = np.linalg.norm(shapes.moment[..., 1:], axis=-1)
         norm_shear = np.linalg.norm(shapes.shear, axis=-1)
         m_labels, n_labels = ("m₂ [kN m]", "m₃ [kN m]"), ("n₂ [kN]", "n₃ [kN]")
-        tension, bending, shear = "Figure 5   Tension", "Bending moment", "Shear force"
+        tension, moment, shear, at_nodes = "Figure 5   Tension", "Bending moment", "Shear force", (shapes.time, shapes.s)
         draw("fig3_configurations.png", configurations, shapes, instants)
         draw("fig4_length.png", length, signals, float(shapes.s[-1]))
-        draw("fig5_tension.png", along, tension, "n₁ [kN]", shapes, shapes.tension, True)
-        draw("fig6_bending_vectors.png", vectors, f"Figure 6   {bending}", m_labels, shapes, shapes.moment[-1, :, 1:])
+        draw("fig5_tension.png", along, tension, "n₁ [kN]", *at_nodes, shapes.tension, True)
+        draw("fig6_bending_vectors.png", vectors, f"Figure 6   {moment}", m_labels, shapes, shapes.moment[-1, :, 1:])
         draw("fig7_shear_vectors.png", vectors, f"Figure 7   {shear}", n_labels, shapes, shapes.shear[-1])
-        draw("fig8_bending.png", along, f"Figure 8   {bending}", "‖(m₂, m₃)‖ [kN m]", shapes, norm_moment, False)
-        draw("fig9_shear.png", along, f"Figure 9   {shear}", "‖(n₂, n₃)‖ [kN]", shapes, norm_shear, False)
+        draw("fig8_bending.png", along, f"Figure 8   {moment}", "‖(m₂, m₃)‖ [kN m]", shapes.time, *bending(shapes), False)
+        draw("fig9_shear.png", along, f"Figure 9   {shear}", "‖(n₂, n₃)‖ [kN]", *at_nodes, norm_shear, False)
     draw("energy.png", energy, signals, {name: _kind(name) for name in signals.names} if kinds is None else kinds)
     return files

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import catenary, mesh, recovery, statics
+from . import catenary, mesh, section_forces, statics
 from .element import ROWS
 from .line import Array, Line, Water, shear_stiffness
 from .parameters import PipeParameters, Section
@@ -88,7 +88,8 @@ def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
     strain = np.empty((len(s) - 1, ROWS))
     element_strains(line, found.position, found.quaternion, strain)
     zero = np.zeros_like(found.position)
-    return recovery.nodal_wrenches(line, calm, found.position, found.quaternion, zero, strain)
+    mass = mass_per_length(parameters, s)
+    return section_forces.nodal_wrenches(line, mass, calm, found.position, found.quaternion, zero, zero, strain)
 
 
 def _characteristics(parameters: PipeParameters) -> Array | None:
@@ -100,8 +101,8 @@ def _characteristics(parameters: PipeParameters) -> Array | None:
         solved = _at_rest(pose, s)
         if solved is None:
             return None
-        forces = recovery.SectionForces.of(solved)
-        largest = recovery.largest_bending_moment(s, forces)
+        forces = section_forces.SectionForces.of(solved)
+        largest = section_forces.largest_bending_moment(s, forces)
         ends = [largest + float(np.hypot(*forces.moment[at, 1:])) for at in (0, -1)]
         found.append([forces.tension[0], forces.tension[-1], largest, *ends])
     return np.array(found)
@@ -148,6 +149,14 @@ def _line(parameters: PipeParameters, s: Array) -> Line:
         numerical_damping=float(parameters.numerical_damping),
     )
     return line
+
+
+def mass_per_length(parameters: PipeParameters, s: Array) -> section_forces.MassPerLength:
+    """Mass per length of the elements between the nodes `s` (n,), along the section and across it."""
+    section = _picker(parameters, s)
+    along = section(lambda one: one.mass_per_length)
+    added = 0.0 if parameters.added_mass is None else parameters.added_mass.coefficient * parameters.environment.water_density
+    return section_forces.MassPerLength(along, along + added * section(lambda one: one.outer_area))
 
 
 def water(parameters: PipeParameters, time: float) -> Water:

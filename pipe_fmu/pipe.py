@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from . import integrator, model, recovery, statics
+from . import integrator, model, section_forces, statics, wall_stress
 from .integrator import STIFF, PipeState, StepResult
 from .line import Array
 from .parameters import PipeParameters
-from .recovery import SectionForces
+from .section_forces import SectionForces
 from .so3 import matrix
 from .statics import Equilibrium
 
@@ -21,7 +21,8 @@ class Pipe:
         self.parameters = model.resolve(parameters)
         self.s, self.line = model.discretize(self.parameters)
         self.water = model.waters(self.parameters)
-        self.walls = recovery.walls(parameters, self.s)
+        self.mass = model.mass_per_length(self.parameters, self.s)
+        self.walls = wall_stress.walls(parameters, self.s)
 
     def equilibrium(self, top: tuple[float, float, float], attitude: Array | None, time: float = 0.0) -> Equilibrium:
         """Static equilibrium with the top at `top` (3,) [m], e, its section at `attitude` (4,), or as it hangs if None."""
@@ -48,9 +49,9 @@ class Pipe:
         return integrator.energy_of(self.line, state)
 
     def section_forces(self, state: PipeState) -> SectionForces:
-        """Section forces at the nodes, material components, without those of damping."""
-        water = self.water(state.time)
-        wrenches = recovery.nodal_wrenches(self.line, water, state.position, state.quaternion, state.velocity, state.strain)
+        """Section forces at the nodes, material components, without those of numerical damping."""
+        water, motion = self.water(state.time), (state.velocity, state.rate)
+        wrenches = section_forces.nodal_wrenches(self.line, self.mass, water, state.position, state.quaternion, *motion, state.strain)
         return SectionForces.of(wrenches)
 
     def spatial_top(self, state: PipeState, wrench: Array) -> Array:
@@ -60,16 +61,20 @@ class Pipe:
 
     def von_mises(self, state: PipeState, forces: SectionForces) -> Array:
         """Largest von Mises stress (n,) [Pa] over the wall at every node."""
-        return recovery.von_mises(self.walls, state.position, forces)
+        return wall_stress.von_mises(self.walls, state.position, forces)
+
+    def largest_von_mises(self, state: PipeState, forces: SectionForces) -> float:
+        """Largest von Mises stress [Pa] along the line, between the nodes too."""
+        return wall_stress.largest_von_mises(self.walls[1], self.s, state.position, forces)
 
     def wall_tension(self, state: PipeState, forces: SectionForces) -> Array:
         """Force (n,) [N] in the wall at every node, at a joint in that of the section below."""
-        return recovery.wall_tension(self.walls[0], state.position, forces)
+        return wall_stress.wall_tension(self.walls[0], state.position, forces)
 
     def largest_bending_moment(self, forces: SectionForces) -> float:
         """Largest bending moment [N m] along the line, between the nodes too."""
-        return recovery.largest_bending_moment(self.s, forces)
+        return section_forces.largest_bending_moment(self.s, forces)
 
     def stretched_length(self, state: PipeState) -> float:
         """Length of the centreline [m], the paper's s_h of Fig. 4."""
-        return recovery.centreline_length(self.line.length, state.strain)
+        return section_forces.centreline_length(self.line.length, state.strain)

@@ -63,8 +63,8 @@ class PipeUnit:
             "moment": (3, "N.m", f"moment {_PULL}, mean over the step"),
             "force_change": (3, "N", f"force {_PULL}, mean over the step, less reference_force"),
             "moment_change": (3, "N.m", f"moment {_PULL}, mean over the step, less reference_moment"),
-            "end_force": (3, "N", f"force {_PULL}, at the end of the step, without damping"),
-            "end_moment": (3, "N.m", f"moment {_PULL}, at the end of the step, without damping"),
+            "end_force": (3, "N", f"force {_PULL}, at the end of the step, without numerical damping"),
+            "end_moment": (3, "N.m", f"moment {_PULL}, at the end of the step, without numerical damping"),
             "top_velocity": (3, "m/s", "velocity of the top, mean over the step, in e"),
             "top_angular_velocity": (3, "rad/s", "angular velocity of the top, mean over the step, in e"),
             "top_position": (3, "m", "position of the top, in e"),
@@ -83,17 +83,17 @@ class PipeUnit:
                 ports[name] = (1, "J", name.replace("_", " ") + (" of the bed" if "contact" in name else " since the start"))
         ports |= {
             "pipe_length": (1, "m", "length of the stretched centreline"),
-            "largest_tension": (1, "N", "largest effective tension"),
-            "largest_bending_moment": (1, "N.m", "largest bending moment"),
-            "largest_von_mises": (1, "Pa", "largest von Mises stress in the wall"),
+            "largest_tension": (1, "N", "largest effective tension at the nodes"),
+            "largest_bending_moment": (1, "N.m", "largest bending moment, between the nodes too"),
+            "largest_von_mises": (1, "Pa", "largest von Mises stress in the wall, between the nodes too"),
             "newton_iterations": (1, "1", "corrections of the last step"),
             "newton_residual": (1, "1", "residual of the last step over the largest element force"),
             "s": (n, "m", "arc length of the nodes"),
             "node_position": (3 * n, "m", "positions of the nodes, in e"),
-            "node_tension": (n, "N", "effective tension at the nodes, without damping"),
+            "node_tension": (n, "N", "effective tension at the nodes, without numerical damping"),
             "node_wall_tension": (n, "N", "force in the wall at the nodes: effective tension less that of the pressures"),
-            "node_moment": (3 * n, "N.m", "torque and bending moments at the nodes, without damping, material components"),
-            "node_shear": (2 * n, "N", "shear forces at the nodes, without damping, material components"),
+            "node_moment": (3 * n, "N.m", "torque and bending moments at the nodes, without numerical damping, material components"),
+            "node_shear": (2 * n, "N", "shear forces at the nodes, without numerical damping, material components"),
         }
         return ports
 
@@ -196,7 +196,7 @@ class PipeUnit:
             "node_shear": forces.shear.ravel(),
             "largest_tension": np.array([forces.tension.max()]),
             "largest_bending_moment": np.array([self._pipe.largest_bending_moment(forces)]),
-            "largest_von_mises": np.array([self._pipe.von_mises(state, forces).max()]),
+            "largest_von_mises": np.array([self._pipe.largest_von_mises(state, forces)]),
             "end_force": -end[:3],
             "end_moment": -end[3:],
         }

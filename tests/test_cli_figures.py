@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from master.figures import configurations, draw_all
+from master.figures import bending, configurations, draw_all
 from master.recorder import Shapes, Table
 
 LENGTH, DEPTH, WEIGHT = 1200.0, 800.0, 759.1
@@ -109,3 +109,15 @@ def test_shapes_archive_holds_arrays_over_instants_and_nodes(tmp_path, shapes):
             "moment": (301, 48, 3),
             "shear": (301, 48, 2),
         }
+
+
+def test_figure_8_follows_the_bending_moment_between_the_nodes():
+    """On 12 nodes a parabola's largest value, half way between two of them, is met; at the nodes the curve has their values."""
+    s, time = np.linspace(0.0, 1100.0, 12), np.zeros(2)
+    m2 = 1e5 - (s - 550.0) ** 2 / 4.0
+    moment = np.tile(np.stack([0.0 * s, m2, 0.0 * s], axis=-1), (2, 1, 1))
+    shear = np.tile(np.stack([0.0 * s, -(s - 550.0) / 2.0], axis=-1), (2, 1, 1))
+    at, found = bending(Shapes(s, time, np.zeros((2, 12, 3)), np.zeros((2, 12)), np.zeros((2, 12)), moment, shear))
+    np.testing.assert_allclose(found[0, ::8], m2, rtol=1e-12)
+    assert found.max() == pytest.approx(1e5, rel=1e-4)
+    assert at[found[0].argmax()] == 550.0

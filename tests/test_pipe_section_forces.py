@@ -9,7 +9,7 @@ import reference_bvp as reference
 from pipe_helpers import HANGING, P16, SECTIONS, TANGENT, TANGENT_ATTITUDE, march, pitch, rotation, sea, started
 
 from pipe_fmu import PipeParameters, PipeUnit, Seabed
-from pipe_fmu.recovery import SectionForces
+from pipe_fmu.section_forces import SectionForces
 
 ANGLE = math.radians(67.380135)
 
@@ -41,13 +41,27 @@ def test_a_pinned_top_leaves_no_torque_in_a_cross_current():
 
 
 @pytest.mark.parametrize("bed", [None, Seabed()])
-def test_end_values_are_the_reactions(bed):
+def test_end_values_are_the_reactions_to_the_error_of_the_element(bed):
+    """At rest the reactions are those of the element's cubic, the recovered values those of a bar under tension: 1e-4 of the moment apart."""
     pipe, found, state = started(clamped("P16", 0.8, seabed=bed))
     forces = pipe.section_forces(state)
     for k, end in ((-1, found.top), (0, -found.foot)):
         r = rotation(state.quaternion[k])
-        np.testing.assert_allclose(r @ np.append(forces.tension[k], forces.shear[k]), end[:3], atol=1e-8 * np.linalg.norm(end[:3]))
-        np.testing.assert_allclose(r @ forces.moment[k], end[3:], atol=1e-6 * np.linalg.norm(end[3:]))
+        np.testing.assert_allclose(r @ np.append(forces.tension[k], forces.shear[k]), end[:3], atol=1e-6 * np.linalg.norm(end[:3]))
+        np.testing.assert_allclose(r @ forces.moment[k], end[3:], atol=1e-4 * pipe.largest_bending_moment(forces))
+
+
+@pytest.mark.parametrize(("mesh", "error"), [("adapted", 1e-5), ("uniform", 6e-3)])
+@pytest.mark.parametrize("name", SECTIONS)
+def test_clamp_moments_agree_with_the_boundary_value_problem(name, mesh, error):
+    """Also where equal elements are 2.6 times as long as the line bends in: their own end moments err by 5e-2."""
+    pipe, _, state = started(clamped(name, 0.8, mesh=mesh))
+    got = pipe.section_forces(state).moment
+    solution = reference.solve(reference.TUBES[name], 1200.0, TANGENT[0], 800.0, ANGLE, current=0.8)
+    moment = solution.at(pipe.s)[3].T
+    largest = np.linalg.norm(moment[:, 1:], axis=1).max()
+    for end in (0, -1):
+        np.testing.assert_allclose(got[end], moment[end], rtol=0.0, atol=error * largest)
 
 
 def test_tension_on_a_straight_hanging_part_grows_with_the_weight():
@@ -67,8 +81,8 @@ def test_largest_ports_are_the_largest_nodal_values_and_the_end_wrench_is_the_pu
     at_nodes = np.hypot(moment[:, 1], moment[:, 2]).max()
     assert at_nodes * (1.0 - 1e-14) <= unit.output("largest_bending_moment")[0] <= 1.05 * at_nodes  # to round-off
     assert unit.output("largest_tension")[0] == unit.output("node_tension").max()
-    np.testing.assert_allclose(unit.output("end_force"), unit.output("force"), rtol=1e-7, atol=1.0)
-    np.testing.assert_allclose(unit.output("end_moment"), unit.output("moment"), rtol=1e-5, atol=1.0)
+    np.testing.assert_allclose(unit.output("end_force"), unit.output("force"), rtol=1e-6, atol=1.0)
+    np.testing.assert_allclose(unit.output("end_moment"), unit.output("moment"), atol=1e-4 * at_nodes)
     assert unit.output("node_position").reshape(n, 3)[-1] == pytest.approx(TANGENT)
     assert unit.output("s")[-1] == 1200.0
 
