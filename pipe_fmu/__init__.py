@@ -1,9 +1,10 @@
 """Geometrically exact submerged pipe as a co-simulation unit.
 
 `Pipe` computes, `PipeUnit` names the ports. Modules, from the facade down:
-slave (substeps), pipe, model (mesh, catenary), wall_stress, section_forces (end_forces), energy, statics (relaxation, static_balance, stability, static_kernel,
-static_drag), integrator (newton, step_kernel, element_kernel, node_kernel), ends, loads (hydrodynamics, seabed), element
-(geometric_stiffness, relative_rotation), assembly, block_tridiagonal, so3, and the lanes they work in (columns, lane_arrays, lanes).
+slave (substeps), pipe, model (mesh, catenary), wall_stress, section_forces (end_forces), energy, statics (relaxation, static_balance,
+stability, static_kernel, static_drag), integrator (newton, step_kernel, element_kernel, node_kernel), ends, loads (hydrodynamics, seabed),
+element (geometric_stiffness, relative_rotation), assembly, block_tridiagonal, so3, and the lanes that they work in
+(columns, lane_arrays, lanes).
 """
 
 from .model import resolve

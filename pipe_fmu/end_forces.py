@@ -1,5 +1,5 @@
-"""What the elements hand to their nodes at an instant: section forces with the viscous part of internal damping, eqs. (20)-(23), less weight
-(28), drag (29)-(31) and the bed's elastic reaction. See section_forces.py.
+"""What the elements hand to their nodes at an instant: section forces, eqs. (20)-(23), with the viscous part of internal damping, less
+weight (28), drag (29)-(31) and the bed's elastic reaction. See section_forces.py.
 """
 
 from .assembly import expand

@@ -7,7 +7,20 @@ import numpy as np
 import pytest
 
 from master.__main__ import main
-from master.benchmarks import costs, coupled, line, own_step, paper_method, peer_exudyn, peer_moordyn, scaling, start, statics, study
+from master.benchmarks import (
+    costs,
+    coupled,
+    forces,
+    line,
+    own_step,
+    paper_method,
+    peer_exudyn,
+    peer_moordyn,
+    scaling,
+    start,
+    statics,
+    study,
+)
 from master.benchmarks.histories import LineCase, Setting
 from master.errors import RunError
 from master.hard_cases import swing
@@ -174,3 +187,14 @@ def test_an_unknown_case_is_a_mistake_in_the_call(tmp_path, capsys):
     allowed = ", ".join(map(repr, study.NAMES))
     assert capsys.readouterr().err == f"pipelay: case = 'fast': must be one of {allowed}\n"
     assert not (tmp_path / "out").exists()
+
+
+def test_bending_moments_in_motion_gain_with_the_elements(monkeypatch, tmp_path, capsys):
+    """From 24 to 48 equal elements more than the factor 4 of a recovery without inertia."""
+    monkeypatch.setattr(forces, "COUNTS", (24, 48))
+    monkeypatch.setattr(forces, "REFERENCE", 192)
+    monkeypatch.setattr(forces, "_DURATION", 16.0)
+    assert main(["bench", "forces", "-o", str(tmp_path)]) == 0
+    rows = [row for row in table(tmp_path / "forces.csv") if row["mesh"] == "uniform"]
+    for coarse, fine in zip(rows[::2], rows[1::2], strict=True):
+        assert float(coarse["nodal_moment"]) > 4.0 * float(fine["nodal_moment"])

@@ -42,7 +42,7 @@ def test_a_pinned_top_leaves_no_torque_in_a_cross_current():
 
 @pytest.mark.parametrize("bed", [None, Seabed()])
 def test_end_values_are_the_reactions_to_the_error_of_the_element(bed):
-    """At rest the reactions are those of the element's cubic, the recovered values those of a bar under tension: 1e-4 of the moment apart."""
+    """Reactions are those of the element's cubic, recovered values those of a bar under tension: 1e-4 of the moment apart."""
     pipe, found, state = started(clamped("P16", 0.8, seabed=bed))
     forces = pipe.section_forces(state)
     for k, end in ((-1, found.top), (0, -found.foot)):

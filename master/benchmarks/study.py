@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TextIO
 
 from tqdm import tqdm
 
-from master.benchmarks import costs, coupled, line, scaling, start, statics
+from master.benchmarks import costs, coupled, forces, line, scaling, start, statics
 from master.benchmarks.precision import draw
 from master.stability.study import _verdict, _write
 
@@ -73,6 +73,10 @@ def _statics(folder: Path, tick: Tick) -> tuple[Rows, list[str], list[Limit]]:
     return rows, [f"  uncertainty of the reference: a share of {bound:.1e}"], []
 
 
+def _forces(folder: Path, tick: Tick) -> tuple[Rows, list[str], list[Limit]]:
+    return forces.sweep(forces.COUNTS, tick), [], []
+
+
 def _costs(folder: Path, tick: Tick) -> tuple[Rows, list[str], list[Limit]]:
     return costs.sweep(tick), [], []
 
@@ -88,7 +92,8 @@ def _start(folder: Path, tick: Tick) -> tuple[Rows, list[str], list[Limit]]:
 
 
 CASES: dict[str, Callable[[Path, Tick], tuple[Rows, list[str], list[Limit]]]] = {
-    "heave": _heave, "snap": _snap, "paper": _paper, "statics": _statics, "costs": _costs, "nodes": _nodes, "start": _start
+    "heave": _heave, "snap": _snap, "paper": _paper, "statics": _statics, "forces": _forces, "costs": _costs, "nodes": _nodes,
+    "start": _start,
 }  # fmt: skip
 NAMES = tuple(CASES)
 
