@@ -1,4 +1,4 @@
-"""What moves the FMUs of a run: the pipe coupled with the vessel, or the pipe alone, its top moved as prescribed."""
+"""What moves the FMUs of a run: the pipe coupled with the vessel, or the pipe alone, its top held or moved as prescribed."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from master.hang_off import hang_off
 from master.ledger import Columns, Ledger
 from master.recorder import Source
 from master.remarks import Remarks
-from master.scene import Sections
-from master.sections import Load, TopMotion, mean_load
+from master.scene import Sections, simulated
+from master.sections import Load, mean_load
 
-LOADS = ("environment_force", "environment_moment")
+LOADS = {"e": ("environment_force", "environment_moment"), "b": ("environment_force_b", "environment_moment_b")}
 SNAP = 1e-10  # of a step: a time this close to a multiple of it is that multiple; round-off does not add up
 Row = dict[tuple[str, str], float]
 
@@ -98,7 +98,7 @@ class Coupled(OnBond):
             self._pipe, self._vessel = end_value_ends(pipe, vessel, bond)
         sources = [(pipe, columns(pipe, "top_work")), (vessel, columns(vessel, "bond_work"))]
         self.ledger = Ledger(sources, rules.energy_check, rules.on_violation)
-        self._macro_step = sections.simulation.macro_step
+        self._macro_step = simulated(sections).macro_step
         self._coupling = coupling(rules.scheme, self._pipe, self._vessel, bond, self._macro_step, rules.tolerance, self.ledger.check)
 
     @property
@@ -132,19 +132,18 @@ class Mover:
 
 
 class Prescribed:
-    """The pipe alone; mean velocities over each step are the exact change of the top's position over its length."""
+    """The pipe alone, its top held, or moved: mean velocities over each step are the exact change of its position over its length."""
 
-    scheme = "the top is moved as prescribed"
-
-    def __init__(self, pipe: Fmu, motion: TopMotion, sections: Sections) -> None:
-        rules = sections.coupling
+    def __init__(self, pipe: Fmu, sections: Sections) -> None:
+        rules, motion = sections.coupling, sections.top_motion
+        self.scheme = "the top is held" if motion is None else "the top is moved as prescribed"
         self.time = 0.0
         self.units: Mapping[str, Fmu] = {"pipe": pipe}
         self.remarks = Remarks.of_start(self.units)
         self._pipe, self._motion, self._mover = impedance_end(pipe, hang_off()), motion, Mover()
         mover = (self._mover, Columns(work=("supplied_work",), bond="bond_work"))
         self.ledger = Ledger([(pipe, columns(pipe, "top_work")), mover], rules.energy_check, rules.on_violation)
-        self._macro_step = self._wanted = sections.simulation.macro_step
+        self._macro_step = self._wanted = simulated(sections).macro_step
         self._steps = self._rejected = 0
 
     @property
@@ -165,7 +164,9 @@ class Prescribed:
 
     def _attempt(self, step: float) -> bool:
         """One step, kept if the pipe and the ledger accept it; a rejection of the smallest step is final and raised."""
-        flow = np.concatenate([self._motion.mean_velocity(self.time, step), np.zeros(3)])
+        flow = np.zeros(6)
+        if self._motion is not None:
+            flow[:3] = self._motion.mean_velocity(self.time, step)
         before = self._mover.supplied
         self._pipe.begin()
         try:
@@ -192,16 +193,17 @@ class LoadedFmu(Fmu):
     """An FMU under the loads of a table, set as their mean over whatever step is asked for."""
 
     rows: Sequence[Load] = ()
+    inputs = LOADS["e"]
 
     def step(self, time: float, step: float, final: bool = False) -> None:
         """See `Fmu.step`."""
-        self.set(LOADS, np.concatenate(mean_load(self.rows, time, step)))
+        self.set(self.inputs, np.concatenate(mean_load(self.rows, time, step)))
         super().step(time, step, final)
 
 
 @contextmanager
 def open_drive(sections: Sections, fmus: Mapping[str, Path]) -> Iterator[Coupled | Prescribed]:
-    """Load and initialise the FMU files of a prepared scene, `pipe` and, unless its top is prescribed, `vessel`. Raises FmuFailed."""
+    """Load and initialise the FMU files of a prepared scene, `pipe` and, unless it is alone, `vessel`. Raises FmuFailed."""
     with ExitStack() as stack:
 
         def load(unit: str, kind: type[Fmu] = Fmu) -> Fmu:
@@ -209,12 +211,12 @@ def open_drive(sections: Sections, fmus: Mapping[str, Path]) -> Iterator[Coupled
 
         pipe = load("pipe")
         pipe.initialize()
-        if sections.top_motion is not None:
-            yield Prescribed(pipe, sections.top_motion, sections)
+        if sections.vessel is None:
+            yield Prescribed(pipe, sections)
             return
         vessel = load("vessel", LoadedFmu if sections.tables else Fmu)
         if isinstance(vessel, LoadedFmu) and sections.tables:
-            vessel.rows = sections.tables.environment
+            vessel.rows, vessel.inputs = sections.tables.environment, LOADS[sections.tables.frame]
         pull = {name: pipe.get(name) for name in hang_off().efforts}
         vessel.initialize(inputs=pull)
         yield Coupled(pipe, vessel, sections)

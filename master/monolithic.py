@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from master.drive import LOADS
 from master.errors import RunError
 from master.scene import Scene
 from master.sections import mean_load
@@ -56,20 +57,20 @@ def _moments(scene: Scene, pipe: Pipe, vessel: Vessel, h: float, steps: int) -> 
     now = Moment(0.0, state, vessel.start(), found.top, np.zeros(6), 0)
     before = now.velocity
     yield now
-    rows = scene.sections.tables.environment if scene.sections.tables else ()
+    tables = scene.sections.tables
     for k in range(steps):
-        load = mean_load(rows, k * h, h) if rows else (np.zeros(3), np.zeros(3))
+        load = dict(zip(LOADS[tables.frame], mean_load(tables.environment, k * h, h), strict=True)) if tables else {}
         after = _step(pipe, vessel, now, 2.0 * now.velocity - before, k * h, h, load)
         before, now = now.velocity, after
         yield now
 
 
-def _step(pipe: Pipe, vessel: Vessel, now: Moment, guess: np.ndarray, time: float, h: float, load: tuple[np.ndarray, np.ndarray]) -> Moment:
+def _step(pipe: Pipe, vessel: Vessel, now: Moment, guess: np.ndarray, time: float, h: float, load: dict[str, np.ndarray]) -> Moment:
     """The moment h [s] later. Raises RunError."""
     velocity, error = guess, np.inf
     for rounds in range(1, _ROUNDS + 1):
         piped = pipe.step(now.pipe._replace(time=time), velocity[:3], velocity[3:], h)
-        inputs = Inputs(force=-piped.top[:3], moment=-piped.top[3:], environment_force=load[0], environment_moment=load[1])
+        inputs = Inputs(force=-piped.top[:3], moment=-piped.top[3:], **load)
         moved = vessel.step(now.vessel, time, h, inputs)
         if not (piped.converged and moved.converged):
             break

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from master.errors import RunError, UsageError
 from master.interrupts import postponed
-from master.scene import Scene
+from master.scene import Scene, simulated
 
 COMMAND = (sys.executable, "-m", "master.prepare")
 
@@ -24,6 +24,7 @@ def prepare(scene: Scene, arguments: Sequence[str] = ()) -> dict[str, Path]:
 
     Raises UsageError for what the units refuse in the scene, RunError without an equilibrium or a child breaking off.
     """
+    simulated(scene.sections)
     request = json.dumps(scene.mapping, default=str)
     # a session of its own: Ctrl-C is for this process, which then ends the child
     with postponed() as asked:  # an exception within Popen would leave the child behind

@@ -46,10 +46,10 @@ class SceneError(UsageError):
 class Sections:
     """The tables of a scene; those of the units are checked by the units."""
 
-    simulation: Simulation
     start: Start
     environment: dict
     pipe: dict
+    simulation: Simulation | None = None
     title: str = ""
     description: str = ""
     coupling: Coupling = field(default_factory=Coupling)
@@ -58,8 +58,6 @@ class Sections:
     tables: Tables | None = None
 
     def __post_init__(self) -> None:
-        if self.vessel is None and self.top_motion is None:
-            raise ValueError("vessel = nothing: must be given, or [top_motion] for a pipe alone")
         if self.vessel is None:
             self._check_pipe_alone()
         elif self.top_motion is not None:
@@ -71,7 +69,7 @@ class Sections:
 
     def _check_pipe_alone(self) -> None:
         if self.start.z is None:
-            raise ValueError("start.z = nothing: must be given for a pipe alone")
+            raise ValueError("start.z: must be given without [vessel], for the height at which the pipe's top is held")
         for name in ("tables", "start.release"):
             owner, _, key = name.rpartition(".")
             if getattr(getattr(self, owner) if owner else self, key) is not None:
@@ -181,6 +179,13 @@ def _merge(mapping: dict[str, Any], change: Mapping[str, Any], source: str, path
             _merge(mapping[key], value, source, where)
         else:
             raise SceneError(f"--set {source}: {where} = {mapping[key]!r} is no table that could hold a key")
+
+
+def simulated(sections: Sections) -> Simulation:
+    """The table [simulation] of a scene that is to be run. Raises SceneError where it has none."""
+    if sections.simulation is None:
+        raise SceneError("simulation: must be given, with duration and macro_step, to run or export a scene")
+    return sections.simulation
 
 
 def of_pipe(scene: Scene) -> Scene:

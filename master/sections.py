@@ -41,9 +41,9 @@ class Section:
 
 @dataclass(frozen=True)
 class Simulation(Section):
-    """[simulation]: how long, in what steps, and what is kept."""
+    """[simulation]: how long, in what steps, and what is kept; statics need no such table."""
 
-    duration: float = _number("time simulated", "s", above=0.0)
+    duration: float = _number("time simulated; statics alone need no [simulation]", "s", above=0.0)
     macro_step: float = _number("step of the coupling, the largest where it adapts", "s", above=0.0)
     recording_step: float | None = _number("time between recorded shapes, once a step at most; absent: none", "s", above=0.0, default=None)
     snapshots: tuple[float, ...] = _number(
@@ -103,9 +103,9 @@ class Start(Section):
 
 @dataclass(frozen=True)
 class TopMotion(Section):
-    """[top_motion]: harmonic displacement of the top of a pipe alone, faded in by a half cosine."""
+    """[top_motion]: harmonic displacement of the top of a pipe alone, faded in by a half cosine; held where there is no such table."""
 
-    amplitude: tuple[float, float, float] = _number("amplitude in x, y, z", "m")
+    amplitude: tuple[float, float, float] = _number("amplitude in x, y, z; without [top_motion] the top of a pipe alone is held", "m")
     period: float = _number("period", "s", above=0.0)
     ramp: float = _number("time of the fade-in", "s", min=0.0, default=0.0)
 
@@ -121,7 +121,7 @@ class TopMotion(Section):
 
 @dataclass(frozen=True)
 class Load(Section):
-    """A row of [[tables.environment]]: spatial force and moment on the vessel at its centre of gravity."""
+    """A row of [[tables.environment]]: force and moment on the vessel at its centre of gravity, in the frame of [tables]."""
 
     time: float = _number("instant", "s")
     force: tuple[float, float, float] = _number("force", "N", default=(0.0, 0.0, 0.0))
@@ -133,6 +133,7 @@ class Tables:
     """[tables]: loads over time, linear between their rows, constant before the first and after the last."""
 
     environment: tuple[Load, ...]
+    frame: Literal["e", "b"] = field(default="e", metadata={"doc": "axes of forces and moments: fixed (e), or the hull's own (b)"})
 
     def __post_init__(self) -> None:
         if not self.environment:

@@ -27,7 +27,8 @@ from vessel_fmu.vessel import Vessel
 
 T = TypeVar("T")
 P = TypeVar("P", PipeParameters, VesselParameters)
-_UNBALANCE = 1e-9  # of the pipe's pull (times a metre for moments) left to the vessel
+_UNBALANCE = 1e-9  # of the pipe's pull (times lever and a metre for moments) left to the vessel, beside the pipe's own residual
+_DIFFERENCE = 1e-10  # square of the relative step of differences: far above what the pipe's answer is known to
 _NOISE = 1e-12  # of a vector's norm: components below it are round-off
 
 
@@ -47,7 +48,7 @@ def equilibrium(scene: Scene) -> Prepared:
     depth = _checked(Environment, environment, "environment").depth
     pipe = _resolved(_pipe(scene, (start.x, start.y, -depth if start.z is None else start.z)))
     if scene.sections.vessel is None:
-        attitude = None if start.departure is None else Rotation.from_euler("zy", [start.yaw, start.departure])
+        attitude = None if start.departure is None else Rotation.from_euler("ZY", [start.yaw, start.departure])
         found = _hang(Pipe(pipe), np.array(pipe.top_position), attitude)
         return Prepared(_placed(pipe, found), None, found)
     vessel = _checked(VesselParameters, scene.mapping["vessel"] | {"environment": environment}, "vessel")
@@ -111,6 +112,7 @@ def _floating(scene: Scene, pipe_parameters: PipeParameters, parameters: VesselP
     start, pipe = scene.sections.start, Pipe(pipe_parameters)
     depth = parameters.environment.depth
     pull = float(np.linalg.norm(_hang(pipe, np.array(pipe_parameters.top_position), None).top[:3]))
+    lever = 1.0 + math.hypot(*parameters.hang_off)
 
     def settle(unknown: np.ndarray) -> tuple[VesselParameters, Equilibrium, np.ndarray, np.ndarray, np.ndarray]:
         z, roll, pitch = unknown
@@ -127,16 +129,16 @@ def _floating(scene: Scene, pipe_parameters: PipeParameters, parameters: VesselP
         centred = body.moment_about_centre(state.quaternion, -found.top[:3], -found.top[3:])
         return posed, found, force - found.top[:3], moment + centred, point
 
-    def unbalance(unknown: np.ndarray) -> np.ndarray:
-        _, _, force, moment, _ = settle(unknown)
-        return np.array([force[2], *(Rotation.from_euler("z", -start.yaw).apply(moment)[:2])]) / pull
+    def unbalance(force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+        along = Rotation.from_euler("z", -start.yaw).apply(moment)
+        return np.array([force[2], along[0] / lever, along[1] / lever]) / pull
 
-    solution = root(unbalance, np.zeros(3), method="hybr", options={"xtol": 1e-14})
-    if not np.abs(unbalance(solution.x)).max() < _UNBALANCE:
-        raise RunError(
-            f"statics: the vessel finds no equilibrium in heave, roll and pitch (unbalance {np.abs(solution.fun).max():.1e} of the pull)"
-        )
+    options = {"xtol": 1e-14, "eps": _DIFFERENCE}
+    solution = root(lambda unknown: unbalance(*settle(unknown)[2:4]), np.zeros(3), method="hybr", options=options)
     posed, found, force, moment, point = settle(solution.x)
+    left = float(np.abs(unbalance(force, moment)).max())
+    if not left < _UNBALANCE + found.residual:
+        raise RunError(f"statics: the vessel finds no equilibrium in heave, roll and pitch (unbalance {left:.1e} of the pull)")
     if start.departure is None:
         state = Vessel(posed).start()
         relative = _rotation(state.quaternion).inv() * _rotation(found.quaternion[-1])

@@ -140,7 +140,7 @@ def general(mapping: Mapping[str, Any], folder: Path) -> General:
             raise ValueError(f"{key} = {str(known[key])[:60]}: unknown key; allowed in a scene of two FMUs: {allowed}")
     for key in ("simulation", "bond"):
         if key not in mapping:
-            raise ValueError(f"{key} = nothing: must be given")
+            raise ValueError(f"{key}: must be given")
     return General(
         build(Simulation, mapping["simulation"], "simulation"),
         tables,

@@ -113,7 +113,7 @@ class Wiring:
         ends = (self.scene.bond.impedance, self.scene.bond.mobility)
         silent = [unit for unit in ends if self.scene.units[unit].energy is None]
         if len(silent) == 1:
-            raise UsageError(f"units.{silent[0]}.energy = nothing: must be given, as for the other unit on the bond, or for neither")
+            raise UsageError(f"units.{silent[0]}.energy: must be given, as for the other unit on the bond, or for neither")
         for unit, table in self.scene.units.items():
             for name in table.outputs:
                 self.port(f"units.{unit}.outputs", unit, name, "output")

@@ -48,7 +48,7 @@ class Section:
         if self.wall_thickness is None:
             for key in ("axial_stiffness", "shear_stiffness", "torsional_stiffness", "bending_stiffness", "mass"):
                 if getattr(self, key) is None:
-                    raise ValueError(f"{key} = nothing: must be given where there is no wall_thickness")
+                    raise ValueError(f"{key}: must be given where there is no wall_thickness")
         elif self.wall_thickness > 0.5 * self.outer_diameter:
             raise ValueError(f"wall_thickness = {self.wall_thickness:g}: must be <= the outer radius {0.5 * self.outer_diameter:g} m")
 
@@ -177,7 +177,7 @@ class PipeParameters:
         if self.sections:
             for i, section in enumerate(self.sections, 1):
                 if section.length is None:
-                    raise ValueError(f"sections[{i}].length = nothing: must be given")
+                    raise ValueError(f"sections[{i}].length: must be given")
             total = sum(section.length or 0.0 for section in self.sections)
             if abs(total - self.length) > 1e-9 * self.length:
                 raise ValueError(f"length = {self.length:g}: must equal the sum of the sections' lengths, {total:g} m")

@@ -41,7 +41,7 @@ BAD = [
     (PipeParameters, {"numerical_damping": 0.7}, r"numerical_damping = 0\.7: must be <= 0\.5"),
     (PipeParameters, {"top_quaternion": (1.0, 1.0, 0.0, 0.0)}, r"top_quaternion = .*: must have length 1, or be all zero"),
     (PipeParameters, {"top_position": (800.0, 0.0, math.nan)}, r"top_position\[3\] = nan: must be finite"),
-    (PipeParameters, {"sections": (Section(),)}, r"sections\[1\]\.length = nothing: must be given"),
+    (PipeParameters, {"sections": (Section(),)}, r"sections\[1\]\.length: must be given"),
     (PipeParameters, {"sections": (Section(length=700.0),)}, r"length = 1200: must equal the sum of the sections' lengths, 700 m"),
 ]
 
@@ -111,7 +111,7 @@ def test_a_cable_without_a_wall_has_its_stiffnesses_and_no_stress():
 @pytest.mark.parametrize("missing", CABLE)
 def test_a_section_without_a_wall_needs_every_stiffness(missing):
     given = {key: value for key, value in CABLE.items() if key != missing}
-    with pytest.raises(ValueError, match=f"{missing} = nothing: must be given where there is no wall_thickness"):
+    with pytest.raises(ValueError, match=f"{missing}: must be given where there is no wall_thickness"):
         Section(wall_thickness=None, **given)
 
 

@@ -95,16 +95,16 @@ def test_a_bad_change_is_named_in_one_line(change, named, rule):
 BAD_FILES = {
     "syntax": ("[simulation\nduration = 1", "mine.toml", "line 1"),
     "suffix": (MINIMAL, "mine.yaml", "must end in .toml"),
-    "without a vessel or a motion": (MINIMAL, "mine.toml", "vessel = nothing: must be given"),
+    "without a vessel or a height": (MINIMAL, "mine.toml", "start.z: must be given without [vessel], for the height"),
     "without a start": (
         MINIMAL.replace("[start]\nx = 800.0", "[vessel]"),
         "mine.toml",
-        "start = nothing: must be given",
+        "start: must be given",
     ),
     "pipe alone without a height": (
         MINIMAL + "[top_motion]\namplitude = [0, 0, 1]\nperiod = 12",
         "mine.toml",
-        "start.z = nothing: must be given",
+        "start.z: must be given",
     ),
 }
 

@@ -33,7 +33,7 @@ BAD_VALUES = {
     "negative drag": ("pipe.section.drag_normal=-1", "drag_normal = -1", "must be >= 0"),
     "impossible Poisson's ratio": ("pipe.section.poisson_ratio=0.6", "poisson_ratio = 0.6", "must be <= 0.5"),
     "sections of another length": ("pipe.sections=[{length=100}]", "pipe.length = 1200", "sum of the sections"),
-    "section without length": ("pipe.sections=[{}]", "pipe.sections[1].length = nothing", "must be given"),
+    "section without length": ("pipe.sections=[{}]", "pipe.sections[1].length", "must be given"),
     "unknown bed": ("pipe.seabed={stiffness=1e5}", "pipe.seabed.stiffness = 100000", "unknown key"),
     "negative depth": ("environment.depth=-800", "environment.depth = -800", "must be > 0 m"),
     "text for a depth": ('environment.depth="deep"', "environment.depth = 'deep'", "must be a number"),

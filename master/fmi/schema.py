@@ -195,6 +195,8 @@ def _join(path: str, key: Any) -> str:
 
 
 def _fault(where: str, value: Any, rule: str) -> ValueError:
-    shown = "nothing" if value is None else repr(value) if isinstance(value, str | list | dict) else str(value)
+    if value is None:
+        return ValueError(f"{where}: {rule}")
+    shown = repr(value) if isinstance(value, str | list | dict) else str(value)
     shown = shown if len(shown) <= 80 else shown[:77] + "..."
     return ValueError(f"{where} = {shown}: {rule}")
