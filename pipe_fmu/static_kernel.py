@@ -29,6 +29,16 @@ def chord(position, a, b):
 
 
 @kernel
+def inverted(position, quaternion):
+    """Whether an element is turned inside out: its chord points against its sections, <d_S phi, R e1> <= 0 in eq. (1)."""
+    for e in range(position.shape[0] - 1):
+        _, u, _ = frame(attitude(quaternion.T, e), attitude(quaternion.T, e + 1), chord(position.T, e, e + 1))
+        if not u[0] > 0.0:
+            return True
+    return False
+
+
+@kernel
 def static_system(line, water, position, quaternion, diagonal, lower, upper, residual, pull):
     """Fill the tangent (n, 6, 6), (n-1, 6, 6) x 2 and residual (n, 6) = internal - external forces; boundary rows untouched.
 
