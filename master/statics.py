@@ -156,10 +156,10 @@ def _hang(pipe: Pipe, point: np.ndarray, attitude: Rotation | None) -> Equilibri
     held = None if attitude is None else np.roll(attitude.as_quat(), 1)
     found = pipe.equilibrium(_three(point), held, 0.0)
     if not found.converged:
-        inside_out = "; an element is turned inside out" if found.inverted else ""
+        flaw = f"; an element is {found.flaw}" if found.flaw else ""
         raise RunError(
             f"statics: the pipe finds no equilibrium with its top at {tuple(np.round(point, 3).tolist())} m: "
-            f"residual {found.residual:.1e} of its weight after {found.iterations} corrections{inside_out}"
+            f"residual {found.residual:.1e} of its weight after {found.iterations} corrections{flaw}"
         )
     return found
 

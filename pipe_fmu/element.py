@@ -13,17 +13,17 @@ Strains (the order of the rows of `stiffness` and of the gradients):
     4  k_2 = (psi_2 - p_2 psi_1 s_2) / h,   5  k_3 = (psi_3 - p_3 psi_1 s_3) / h     bending
     6  c_z = e3 . (d x R_m psi) / 2                         sag of the arc below the chord (loads, not strain)
 
-Where the chord stands at an angle a to t_1 of the mid frame, s is |u| / h times the sine of a and f = 2 |u| / (|u| + u_1) = 1 / cos^2(a / 2),
-so that g is |u| / h times 2 tan(a / 2). The two are the same to third order, but the sine falls beyond a right angle and vanishes at
-a = pi, where the element is turned inside out; g grows with a and without bound, as <d_S phi, R e1> > 0 of eq. (1) demands. The extension by
-bending takes f s^2 (that is 4 sin^2(a / 2)): it grows with a too, so that tension as well turns an element right side out, and is bounded,
-so that no element can pay for its turning by shortening to a point. Twist and bending take s, as what they correct is small.
+Where the chord stands at an angle a to t_1 of the mid frame, s is |u| / h times the sine of a and f = 2 |u| / (|u| + u_1), which is
+1 / cos^2(a / 2), so that g is |u| / h times 2 tan(a / 2). The two are the same to third order, but the sine falls beyond a right angle and
+vanishes at a = pi, where the element is turned inside out; g grows with a and without bound, as <d_S phi, R e1> > 0 of eq. (1) demands.
+The extension by bending takes f s^2 (that is 4 sin^2(a / 2)): it grows with a too, so that tension as well turns an element right side
+out, and is bounded, so that no element can pay for its turning by shortening to a point. Twist and bending, corrected by little, take s.
 
 For a constant strain the centreline is a helix (log of the relative frame on SE(3)) whose length is
 l^2 = P |u|^2 - G (psi.u)^2, P = rho^2, G = (P - 1) / |psi|^2, rho = a / sin a, a = |psi| / 2; bent and
 twisted at once, its chord leaves the mid frame by psi_1 psi / 24 (to third order), which is no shear. A bending moment that varies
 over the element (shear force Q, kappa' = Q / EI) bends it to an S: the chord leaves the mid frame by h^2 kappa' / 12, the
-centreline grows by a tenth of that angle squared (0.1 f p^2 s^2), and the log loses h^2 / 12 kappa x kappa' (second term of the Magnus series), which
+centreline grows by a tenth of that angle squared, and the log loses h^2 / 12 kappa x kappa' (second term of the Magnus series), which
 k_1, k_2, k_3 give back. So the chord's shear flexibility is 1/K = 1/GA + h^2 / (12 EI), p = (h^2 / 12 EI) K is the share that is bending,
 and the energy h/2 (EA e^2 + K g^2 + GJ k_1^2 + EI k^2) is that of the bar with linearly varying moment. Departures from
 the plain law (20): the extension is measured along the centreline, not along t_1; they differ by g^2/2, g the physical shear

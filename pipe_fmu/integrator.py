@@ -8,7 +8,7 @@ from .energy import energies
 from .line import Array, Line, Water
 from .newton import solve_step
 from .state import WORKS, PipeState
-from .static_kernel import inverted
+from .static_kernel import INSIDE_OUT, inverted
 from .step_kernel import element_strains, folded
 
 STIFF = np.zeros((6, 6))  # mobility of a top that moves as it is told
@@ -61,7 +61,7 @@ def _flaw(line: Line, old: PipeState, new: PipeState) -> str:
     """What an element would be in a state `new` that is no configuration of a line; empty if it is one."""
     if folded(line.length, old.strain, new.strain):
         return "bent or twisted past half a turn between its nodes"
-    return "turned inside out" if inverted(new.position, new.quaternion) else ""
+    return INSIDE_OUT if inverted(new.position, new.quaternion) else ""
 
 
 def energy_of(line: Line, state: PipeState) -> tuple[float, float, float, float]:

@@ -66,7 +66,7 @@ def newton(balance: Balance) -> Rest:
 
 def _rest(balance: Balance, stable: bool, iteration: int) -> Rest:
     """Where a search has come to rest: an equilibrium unless an element is turned inside out."""
-    sound = not balance.inverted()
+    sound = not balance.flaw()
     return Rest(balance, sound, sound and stable, iteration)
 
 

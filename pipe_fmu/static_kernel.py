@@ -9,6 +9,8 @@ from .geometric_stiffness import geometric_stiffness
 from .loads import add_press, add_press_stiffness, press
 from .static_drag import add_static_drag
 
+INSIDE_OUT = "turned inside out"  # see `inverted`
+
 
 @inner
 def vector_of(columns, k, at):

@@ -75,16 +75,15 @@ def equilibrium(scene: Scene, nodes: int = 48):
 
 
 def figures(pipe, found):
-    """(force at the top (3,), largest bending moment) of an equilibrium; NaN if it is none or not stable."""
+    """(size of the force at the top, largest bending moment) of an equilibrium; NaN if it is none or not stable."""
     if not (found.converged and found.stable):
-        return np.full(3, math.nan), math.nan
-    return found.top[:3], pipe.largest_bending_moment(pipe.section_forces(pipe.at_rest(found)))
+        return math.nan, math.nan
+    return float(np.linalg.norm(found.top[:3])), pipe.largest_bending_moment(pipe.section_forces(pipe.at_rest(found)))
 
 
 def differences(coarse, fine):
-    """Relative differences of (force at the top, largest bending moment) between two `figures`."""
-    force = np.linalg.norm(coarse[0] - fine[0]) / np.linalg.norm(fine[0])
-    return float(force), abs(coarse[1] - fine[1]) / fine[1]
+    """Relative differences of two `figures`, over those of the `fine` mesh."""
+    return [abs(a - b) / b for a, b in zip(coarse, fine, strict=True)]
 
 
 def main(coarse: int = 48, fine: int = 200, *numbers: int) -> None:

@@ -102,6 +102,17 @@ def test_resultant_is_the_stress_times_the_gradients(bend, share, chord):
     np.testing.assert_allclose(got, stress @ gradients(*at, share), atol=1e-13 * np.abs(got).max())
 
 
+@pytest.mark.parametrize("angle", [1.0, 30.0, 80.0, 100.0, 150.0, 179.0])
+def test_shear_is_twice_the_tangent_of_half_the_angle_of_the_chord_and_tension_counts_its_sine(angle):
+    """A straight element: nothing but the angle a between chord and sections; the extension by bending is a tenth of 4 sin^2(a / 2)."""
+    a, size = math.radians(angle), 0.9
+    q1, q2, d = pose((0.0, 0.0, 0.0), LENGTH * size * np.array([math.cos(a), 0.6 * math.sin(a), -0.8 * math.sin(a)]))
+    got = strains(q1, q2, d, np.full(2, 0.97))
+    np.testing.assert_allclose(got[1:3], 2.0 * size * math.tan(0.5 * a) * np.array([0.6, -0.8]), rtol=1e-10)
+    assert got[0] == pytest.approx(size - 1.0 + 0.4 * (0.97 * size * math.sin(0.5 * a)) ** 2, rel=1e-12)
+    np.testing.assert_allclose(got[3:6], 0.0, atol=1e-15)
+
+
 @pytest.mark.parametrize("turn", [(0.7, -0.2, 0.4), (0.0, math.pi / 2, 0.0), (-2.0, 1.5, 1.0)])
 def test_strains_do_not_feel_a_rigid_motion(turn):
     q1, q2, d = pose((0.1, -0.4, 0.43))
