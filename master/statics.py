@@ -158,9 +158,10 @@ def _hang(pipe: Pipe, point: np.ndarray, attitude: Rotation | None) -> Equilibri
     held = None if attitude is None else np.roll(attitude.as_quat(), 1)
     found = pipe.equilibrium(_three(point), held, 0.0)
     if not found.converged:
+        flaw = f"; an element is {found.flaw}" if found.flaw else ""
         raise RunError(
             f"statics: the pipe finds no equilibrium with its top at {tuple(np.round(point, 3).tolist())} m: "
-            f"residual {found.residual:.1e} of its weight after {found.iterations} corrections"
+            f"residual {found.residual:.1e} of its weight after {found.iterations} corrections{flaw}"
         )
     return found
 

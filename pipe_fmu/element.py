@@ -8,10 +8,16 @@ R_m = R_1 exp(psi / 2) half way between the ends, everything the element feels i
 Strains (the order of the rows of `stiffness` and of the gradients):
 
     0  e   = length of the element's centreline / h - 1     extension, eq. (17)
-    1  g_2 = w_2 / h,   2  g_3 = w_3 / h                    shear of the chord against the mid frame, w = u - psi_1 u_1 psi / 24
-    3  k_1 = (psi_1 + p_2 psi_2 g_2 + p_3 psi_3 g_3) / h    twist
-    4  k_2 = (psi_2 - p_2 psi_1 g_2) / h,   5  k_3 = (psi_3 - p_3 psi_1 g_3) / h     bending
+    1  g_2 = f s_2,   2  g_3 = f s_3                        shear of the chord against the mid frame, s = (u - psi_1 u_1 psi / 24) / h
+    3  k_1 = (psi_1 + p_2 psi_2 s_2 + p_3 psi_3 s_3) / h    twist
+    4  k_2 = (psi_2 - p_2 psi_1 s_2) / h,   5  k_3 = (psi_3 - p_3 psi_1 s_3) / h     bending
     6  c_z = e3 . (d x R_m psi) / 2                         sag of the arc below the chord (loads, not strain)
+
+Where the chord stands at an angle a to t_1 of the mid frame, s is |u| / h times the sine of a and f = 2 |u| / (|u| + u_1), which is
+1 / cos^2(a / 2), so that g is |u| / h times 2 tan(a / 2). The two are the same to third order, but the sine falls beyond a right angle and
+vanishes at a = pi, where the element is turned inside out; g grows with a and without bound, as <d_S phi, R e1> > 0 of eq. (1) demands.
+The extension by bending takes f s^2 (that is 4 sin^2(a / 2)): it grows with a too, so that tension as well turns an element right side
+out, and is bounded, so that no element can pay for its turning by shortening to a point. Twist and bending, corrected by little, take s.
 
 For a constant strain the centreline is a helix (log of the relative frame on SE(3)) whose length is
 l^2 = P |u|^2 - G (psi.u)^2, P = rho^2, G = (P - 1) / |psi|^2, rho = a / sin a, a = |psi| / 2; bent and
@@ -51,9 +57,18 @@ def frame(q1, q2, d):
 
 @inner
 def chord_shear(u, psi, h):
-    """(g_2, g_3): shear of the chord, less what coiling does."""
+    """(s_2, s_3): sideways part of the chord over h, less what coiling does."""
     coil = COIL * psi[0] * u[0]
     return (u[1] - coil * psi[1]) / h, (u[2] - coil * psi[2]) / h
+
+
+@inner
+def barrier(u):
+    """f = 2 |u| / (|u| + u_1), which is 1 along t_1 and infinite against it, and its gradient."""
+    size = math.sqrt(dot(u, u))
+    f = 2.0 * size / (size + u[0])
+    k = 0.5 * f * f / (size * size * size)
+    return f, (-k * (u[1] * u[1] + u[2] * u[2]), k * u[0] * u[1], k * u[0] * u[2])
 
 
 @inner
@@ -64,14 +79,15 @@ def strains(rm, u, psi, h, share, out):
     rho = 1.0 + z * chi
     along = dot(psi, u)
     length = math.sqrt(rho * rho * dot(u, u) - chi * (rho + 1.0) * along * along)
-    g2, g3 = chord_shear(u, psi, h)
-    p2, p3 = share[0], share[1]
-    out[0] = (length - h) / h + 0.1 * (p2 * p2 * g2 * g2 + p3 * p3 * g3 * g3)
-    out[1] = g2
-    out[2] = g3
-    out[3] = (psi[0] + p2 * psi[1] * g2 + p3 * psi[2] * g3) / h
-    out[4] = (psi[1] - p2 * psi[0] * g2) / h
-    out[5] = (psi[2] - p3 * psi[0] * g3) / h
+    s2, s3 = chord_shear(u, psi, h)
+    f, _ = barrier(u)
+    b2, b3 = share[0] * s2, share[1] * s3
+    out[0] = (length - h) / h + 0.1 * f * (b2 * b2 + b3 * b3)
+    out[1] = f * s2
+    out[2] = f * s3
+    out[3] = (psi[0] + b2 * psi[1] + b3 * psi[2]) / h
+    out[4] = (psi[1] - b2 * psi[0]) / h
+    out[5] = (psi[2] - b3 * psi[0]) / h
     out[6] = 0.5 * dot(rm[2], cross(u, psi))
 
 
@@ -105,23 +121,27 @@ def gradients(rm, u, psi, h, share, out):
     b = half_spin(z)[0]
     length, half_u, half_psi = _stretch(u, psi, chi, chi1)
     p2, p3 = share[0], share[1]
-    g2, g3 = chord_shear(u, psi, h)
+    s2, s3 = chord_shear(u, psi, h)
+    f, f_u = barrier(u)
     turn, push = -COIL * u[0] / h, -COIL * psi[0] / h
     n2, q2 = (push * psi[1], 1.0 / h, 0.0), (turn * psi[1], turn * psi[0], 0.0)
     n3, q3 = (push * psi[2], 0.0, 1.0 / h), (turn * psi[2], 0.0, turn * psi[0])
-    _put(out[1], rm, n2, q2, cross(n2, u), psi, chi, b)
-    _put(out[2], rm, n3, q3, cross(n3, u), psi, chi, b)
-    k = 1.0 / (h * length)
-    n = add(scale(k, half_u), add(scale(0.2 * p2 * p2 * g2, n2), scale(0.2 * p3 * p3 * g3, n3)))
-    q = add(scale(k, half_psi), add(scale(0.2 * p2 * p2 * g2, q2), scale(0.2 * p3 * p3 * g3, q3)))
+    n = add(scale(f, n2), scale(s2, f_u))
+    _put(out[1], rm, n, scale(f, q2), cross(n, u), psi, chi, b)
+    n = add(scale(f, n3), scale(s3, f_u))
+    _put(out[2], rm, n, scale(f, q3), cross(n, u), psi, chi, b)
+    k, l2, l3 = 1.0 / (h * length), 0.2 * f * p2 * p2 * s2, 0.2 * f * p3 * p3 * s3
+    n = add(scale(0.1 * (p2 * p2 * s2 * s2 + p3 * p3 * s3 * s3), f_u), add(scale(l2, n2), scale(l3, n3)))
+    n = add(scale(k, half_u), n)
+    q = add(scale(k, half_psi), add(scale(l2, q2), scale(l3, q3)))
     _put(out[0], rm, n, q, cross(n, u), psi, chi, b)
     n = add(scale(p2 * psi[1] / h, n2), scale(p3 * psi[2] / h, n3))
     q = add(scale(p2 * psi[1] / h, q2), scale(p3 * psi[2] / h, q3))
-    q = add(q, (1.0 / h, p2 * g2 / h, p3 * g3 / h))
+    q = add(q, (1.0 / h, p2 * s2 / h, p3 * s3 / h))
     _put(out[3], rm, n, q, cross(n, u), psi, chi, b)
-    n, q = scale(-p2 * psi[0] / h, n2), add(scale(-p2 * psi[0] / h, q2), (-p2 * g2 / h, 1.0 / h, 0.0))
+    n, q = scale(-p2 * psi[0] / h, n2), add(scale(-p2 * psi[0] / h, q2), (-p2 * s2 / h, 1.0 / h, 0.0))
     _put(out[4], rm, n, q, cross(n, u), psi, chi, b)
-    n, q = scale(-p3 * psi[0] / h, n3), add(scale(-p3 * psi[0] / h, q3), (-p3 * g3 / h, 0.0, 1.0 / h))
+    n, q = scale(-p3 * psi[0] / h, n3), add(scale(-p3 * psi[0] / h, q3), (-p3 * s3 / h, 0.0, 1.0 / h))
     _put(out[5], rm, n, q, cross(n, u), psi, chi, b)
     down = rm[2]
     n = scale(0.5, cross(psi, down))
@@ -130,30 +150,33 @@ def gradients(rm, u, psi, h, share, out):
 
 
 @inner
-def shear_force(g2, g3, psi, h, share, stress):
-    """What is conjugate to w: the chord's shear force over h, with the parts of extension, twist and bending that go with it."""
+def shear_force(s2, s3, f, psi, h, share, stress):
+    """What is conjugate to h s and to f; the former is the chord's shear force, with the parts of extension, twist and bending that go
+    with it."""
     p2, p3 = share[0], share[1]
-    n2 = stress[1] + 0.2 * stress[0] * p2 * p2 * g2 + p2 * (stress[3] * psi[1] - stress[4] * psi[0]) / h
-    n3 = stress[2] + 0.2 * stress[0] * p3 * p3 * g3 + p3 * (stress[3] * psi[2] - stress[5] * psi[0]) / h
-    return (0.0, n2 / h, n3 / h)
+    l2, l3 = 0.1 * stress[0] * p2 * p2 * s2, 0.1 * stress[0] * p3 * p3 * s3
+    n2 = f * (stress[1] + 2.0 * l2) + p2 * (stress[3] * psi[1] - stress[4] * psi[0]) / h
+    n3 = f * (stress[2] + 2.0 * l3) + p3 * (stress[3] * psi[2] - stress[5] * psi[0]) / h
+    return (0.0, n2 / h, n3 / h), s2 * (stress[1] + l2) + s3 * (stress[2] + l3)
 
 
 @inner
 def conjugate_vectors(down, u, psi, h, share, stress, chi, chi1):
     """(n, q, c) of the function `stress` (7,) . (strains and sag); `down` = R_m^T e3."""
-    p2, p3 = share[0], share[1]
-    s3, s4, s5, s6 = stress[3], stress[4], stress[5], 0.5 * stress[6]
+    p2, p3, sag = share[0], share[1], 0.5 * stress[6]
     length, half_u, half_psi = _stretch(u, psi, chi, chi1)
     arc = stress[0] / (h * length)
-    g2, g3 = chord_shear(u, psi, h)
-    shear = shear_force(g2, g3, psi, h, share, stress)
+    s2, s3 = chord_shear(u, psi, h)
+    f, f_u = barrier(u)
+    shear, turning = shear_force(s2, s3, f, psi, h, share, stress)
     bent = dot(shear, psi)
-    n = add(scale(arc, half_u), scale(s6, cross(psi, down)))
-    n = add(n, (-COIL * psi[0] * bent, shear[1], shear[2]))
-    q = add(scale(arc, half_psi), scale(s6, cross(down, u)))
-    q = add(q, ((s3 - p2 * g2 * s4 - p3 * g3 * s5) / h, (s3 * p2 * g2 + s4) / h, (s3 * p3 * g3 + s5) / h))
+    n = add(scale(arc, half_u), scale(sag, cross(psi, down)))
+    n = add(n, add((-COIL * psi[0] * bent, shear[1], shear[2]), scale(turning, f_u)))
+    q = add(scale(arc, half_psi), scale(sag, cross(down, u)))
+    b2, b3 = p2 * s2, p3 * s3
+    q = add(q, ((stress[3] - b2 * stress[4] - b3 * stress[5]) / h, (stress[3] * b2 + stress[4]) / h, (stress[3] * b3 + stress[5]) / h))
     q = add(q, scale(-COIL * u[0], (bent, psi[0] * shear[1], psi[0] * shear[2])))
-    return n, q, add(cross(n, u), scale(s6, cross(cross(u, psi), down)))
+    return n, q, add(cross(n, u), scale(sag, cross(cross(u, psi), down)))
 
 
 @inner

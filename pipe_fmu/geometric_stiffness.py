@@ -7,7 +7,7 @@ of the conjugate vectors n, q, c and m, and last their turning with the mid fram
 import math
 
 from .compiled import inner
-from .element import COIL, chord_shear, conjugate_vectors, shear_force
+from .element import COIL, barrier, chord_shear, conjugate_vectors, shear_force
 from .relative_rotation import chi_of, half_spin
 from .so3 import add, apply, cross, dot, scale
 
@@ -44,17 +44,29 @@ def _stretched(extent, u, psi, d_u, d_psi):
 
 
 @inner
-def _sheared(u, psi, h, share, stress, shear, bent, d_u, d_psi):
-    """Changes of the parts of n and q that shear, twist and bending make."""
+def _turned(u, f, f_u, d_u):
+    """Changes of the barrier f and of its gradient."""
+    x = dot(u, u)
+    longer = dot(u, d_u)
+    d_f = dot(f_u, d_u)
+    k = 0.5 * f * f / (x * math.sqrt(x))
+    d_bow = add(add(scale(d_u[0], u), scale(u[0], d_u)), (-2.0 * longer, 0.0, 0.0))
+    return d_f, add(scale(2.0 * d_f / f - 3.0 * longer / x, f_u), scale(k, d_bow))
+
+
+@inner
+def _sheared(u, psi, h, share, stress, s2, s3, f, d_f, shear, bent, d_u, d_psi):
+    """Changes of the parts of n and q that shear, twist and bending make, and of what is conjugate to f."""
     p2, p3 = share[0], share[1]
-    s0, s3, s4, s5 = stress[0], stress[3], stress[4], stress[5]
+    t0, t3, t4, t5 = 0.2 * stress[0], stress[3], stress[4], stress[5]
     coil, d_coil = COIL * psi[0] * u[0], COIL * (d_psi[0] * u[0] + psi[0] * d_u[0])
-    d_g2 = (d_u[1] - d_coil * psi[1] - coil * d_psi[1]) / h
-    d_g3 = (d_u[2] - d_coil * psi[2] - coil * d_psi[2]) / h
+    d_s2 = (d_u[1] - d_coil * psi[1] - coil * d_psi[1]) / h
+    d_s3 = (d_u[2] - d_coil * psi[2] - coil * d_psi[2]) / h
+    across2, across3 = stress[1] + t0 * p2 * p2 * s2, stress[2] + t0 * p3 * p3 * s3
     d_shear = (
         0.0,
-        (0.2 * s0 * p2 * p2 * d_g2 + p2 * (s3 * d_psi[1] - s4 * d_psi[0]) / h) / h,
-        (0.2 * s0 * p3 * p3 * d_g3 + p3 * (s3 * d_psi[2] - s5 * d_psi[0]) / h) / h,
+        (d_f * across2 + f * t0 * p2 * p2 * d_s2 + p2 * (t3 * d_psi[1] - t4 * d_psi[0]) / h) / h,
+        (d_f * across3 + f * t0 * p3 * p3 * d_s3 + p3 * (t3 * d_psi[2] - t5 * d_psi[0]) / h) / h,
     )
     d_bent = dot(d_shear, psi) + dot(shear, d_psi)
     d_turn = (
@@ -62,8 +74,9 @@ def _sheared(u, psi, h, share, stress, shear, bent, d_u, d_psi):
         d_coil * shear[1] + coil * d_shear[1],
         d_coil * shear[2] + coil * d_shear[2],
     )
-    d_q = (-(s4 * p2 * d_g2 + s5 * p3 * d_g3) / h, s3 * p2 * d_g2 / h, s3 * p3 * d_g3 / h)
-    return (-COIL * (d_psi[0] * bent + psi[0] * d_bent), d_shear[1], d_shear[2]), add(d_q, scale(-1.0, d_turn))
+    d_q = (-(t4 * p2 * d_s2 + t5 * p3 * d_s3) / h, t3 * p2 * d_s2 / h, t3 * p3 * d_s3 / h)
+    d_n = (-COIL * (d_psi[0] * bent + psi[0] * d_bent), d_shear[1], d_shear[2])
+    return d_n, add(d_q, scale(-1.0, d_turn)), across2 * d_s2 + across3 * d_s3
 
 
 @inner
@@ -77,8 +90,9 @@ def geometric_stiffness(rm, u, psi, h, share, stress, out):
     n, q, c = conjugate_vectors(down, u, psi, h, share, stress, chi, chi1)
     extent = _extent(u, psi, chi, chi1, chi2)
     arc = stress[0] / (h * extent[3])
-    g2, g3 = chord_shear(u, psi, h)
-    shear = shear_force(g2, g3, psi, h, share, stress)
+    s2, s3 = chord_shear(u, psi, h)
+    f, f_u = barrier(u)
+    shear, turning = shear_force(s2, s3, f, psi, h, share, stress)
     bent = dot(shear, psi)
     psi_q = dot(psi, q)
     m = add(add(scale(rho, q), scale(-chi * psi_q, psi)), scale(b, cross(psi, c)))
@@ -94,7 +108,9 @@ def geometric_stiffness(rm, u, psi, h, share, stress, out):
         d_down = cross(down, spin)
         turned = dot(psi, d_psi)
         stretched_u, stretched_psi = _stretched(extent, u, psi, d_u, d_psi)
-        sheared_n, sheared_q = _sheared(u, psi, h, share, stress, shear, bent, d_u, d_psi)
+        d_f, d_f_u = _turned(u, f, f_u, d_u)
+        sheared_n, sheared_q, d_turning = _sheared(u, psi, h, share, stress, s2, s3, f, d_f, shear, bent, d_u, d_psi)
+        sheared_n = add(sheared_n, add(scale(turning, d_f_u), scale(d_turning, f_u)))
         d_n = add(add(scale(arc, stretched_u), scale(s6, add(cross(d_psi, down), cross(psi, d_down)))), sheared_n)
         d_q = add(add(scale(arc, stretched_psi), scale(s6, add(cross(d_down, u), cross(down, d_u)))), sheared_q)
         d_c = add(cross(d_n, u), cross(n, d_u))

@@ -8,6 +8,7 @@ from .energy import energies
 from .line import Array, Line, Water
 from .newton import solve_step
 from .state import WORKS, PipeState
+from .static_kernel import INSIDE_OUT, inverted
 from .step_kernel import element_strains, folded
 
 STIFF = np.zeros((6, 6))  # mobility of a top that moves as it is told
@@ -24,7 +25,7 @@ class StepResult(NamedTuple):
     impedance: Array  # (6, 6) d top / d (mean velocity, mean angular velocity)
     iterations: int
     residual: float  # of the largest element force
-    folded: bool = False  # not converged because an element would be bent or twisted past half a turn
+    flaw: str = ""  # not converged because an element would be so
 
 
 def rest(line: Line, position: Array, quaternion: Array, time: float) -> PipeState:
@@ -43,17 +44,24 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     water: at the middle of the step; velocity, spin (3,): mean velocity and angular velocity of the top, in e; or those that it
     would have without the pipe, where it yields to the pipe's pull with `mobility` (6, 6), the derivative of the one by the other.
     """
-    spent, fold = 0, False
+    spent, flaw = 0, ""
     for weights, careful in _SEARCHES:
         converged, new, force, impedance, iterations, residual = solve_step(
             line, water, state, velocity, spin, h, mobility, weights, careful
         )
         spent += iterations
-        fold = converged and folded(line.length, state.strain, new.strain)
-        if converged and not fold:
+        flaw = _flaw(line, state, new) if converged else ""
+        if converged and not flaw:
             break
-    done = converged and not fold
-    return StepResult(done, new if done else state, force, impedance, spent, residual, fold)
+    done = converged and not flaw
+    return StepResult(done, new if done else state, force, impedance, spent, residual, flaw)
+
+
+def _flaw(line: Line, old: PipeState, new: PipeState) -> str:
+    """What an element would be in a state `new` that is no configuration of a line; empty if it is one."""
+    if folded(line.length, old.strain, new.strain):
+        return "bent or twisted past half a turn between its nodes"
+    return INSIDE_OUT if inverted(new.position, new.quaternion) else ""
 
 
 def energy_of(line: Line, state: PipeState) -> tuple[float, float, float, float]:

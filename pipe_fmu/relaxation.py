@@ -55,13 +55,19 @@ def newton(balance: Balance) -> Rest:
         if not balance.size < LOST:
             break
         if _resting(balance.size, best):
-            return Rest(balance, True, balance.stable(), iteration)
+            return _rest(balance, balance.stable(), iteration)
         best = min(best, balance.size)
         factors = Factors(balance, 0.0)
         if not factors.regular:
             break
         balance = balance.after(limited(factors.correction(balance.residual), _TURN))
     return Rest(balance, False, False, iteration)
+
+
+def _rest(balance: Balance, stable: bool, iteration: int) -> Rest:
+    """Where a search has come to rest: an equilibrium unless an element is turned inside out."""
+    sound = not balance.flaw()
+    return Rest(balance, sound, sound and stable, iteration)
 
 
 def _resting(size: float, best: float) -> bool:
@@ -74,7 +80,7 @@ def descend(balance: Balance, limit: int) -> Rest:
     for iteration in range(limit):
         definite = balance.definite()
         if _resting(balance.size, best) and (definite or balance.stable()):
-            return Rest(balance, True, True, iteration)
+            return _rest(balance, True, iteration)
         best = min(best, balance.size)
         if not definite:
             damping = max(damping, _LEAST_DAMPING)
@@ -90,7 +96,7 @@ def descend(balance: Balance, limit: int) -> Rest:
         if ratio > 0.5:
             damping = 0.25 * damping if damping > 4.0 * _LEAST_DAMPING else 0.0
         turn = min(2.0 * turn, _TURN)
-    return Rest(balance, balance.size <= ROUND_OFF, False, iteration)
+    return _rest(balance, False, iteration) if balance.size <= ROUND_OFF else Rest(balance, False, False, iteration)
 
 
 def _step(balance: Balance, damping: float, turn: float, definite: bool) -> tuple[Balance | None, float]:

@@ -108,7 +108,8 @@ class PipeUnit:
         """Find the static equilibrium; a message if there is none."""
         found, state = self._pipe.start(time)
         if not found.converged:
-            return f"statics: no equilibrium after {found.iterations} corrections, residual {found.residual:.2e} of the weight"
+            flaw = f"; an element is {found.flaw}" if found.flaw else ""
+            return f"statics: no equilibrium after {found.iterations} corrections, residual {found.residual:.2e} of the weight{flaw}"
         still = np.zeros(3)
         self._pipe.step(state, still, still, 1e-3)  # so that compiling its kernel belongs to the start, not to the first step
         self.state = (state, found.top, found.stiffness, 0, found.residual)
@@ -129,8 +130,8 @@ class PipeUnit:
         what = f"step of {h:g} s at t = {time:g} s"
         if not result.converged:
             nor = f", nor in sub-steps of {h / most:g} s" if most > 1 else ""
-            if result.folded:
-                return f"{what}{nor}: an element would be bent or twisted past half a turn between its nodes; more nodes may help"
+            if result.flaw:
+                return f"{what}{nor}: an element would be {result.flaw}; more nodes may help"
             corrections = f"no convergence after {result.iterations} corrections"
             return f"{what}: {corrections}{nor}, residual {result.residual:.2e} of the largest section force"
         self.remark = ""

@@ -11,7 +11,7 @@ from .ends import condense_top, hold_foot, hold_foot_residual, top_correction
 from .line import Array, Line, Water
 from .so3 import exp, multiply, normalize
 from .stability import positive
-from .static_kernel import attitude, static_system
+from .static_kernel import INSIDE_OUT, attitude, inverted, static_system
 
 Pose = tuple[Array, Array]  # positions (n, 3) [m], attitudes (n, 4)
 
@@ -77,6 +77,10 @@ class Balance:
         """Strike what acts on the held ends from forces (n, 6)."""
         hold_foot_residual(self.line, self.pose[1], (0.0, 0.0, 0.0), vector)
         vector[-1, : 6 if self.line.top_clamped else 3] = 0.0
+
+    def flaw(self) -> str:
+        """What an element is in a pose that is no configuration of a line; empty if it is one."""
+        return INSIDE_OUT if inverted(*self.pose) else ""
 
     def stable(self) -> bool:
         """Whether the line comes back when it is pushed.

@@ -9,6 +9,8 @@ from .geometric_stiffness import geometric_stiffness
 from .loads import add_press, add_press_stiffness, press
 from .static_drag import add_static_drag
 
+INSIDE_OUT = "turned inside out"  # see `inverted`
+
 
 @inner
 def vector_of(columns, k, at):
@@ -26,6 +28,16 @@ def attitude(quaternion, at):
 def chord(position, a, b):
     """phi_b - phi_a from columns of positions, or of displacements."""
     return (position[0, b] - position[0, a], position[1, b] - position[1, a], position[2, b] - position[2, a])
+
+
+@kernel
+def inverted(position, quaternion):
+    """Whether an element is turned inside out: its chord points against its sections, <d_S phi, R e1> <= 0 in eq. (1)."""
+    for e in range(position.shape[0] - 1):
+        _, u, _ = frame(attitude(quaternion.T, e), attitude(quaternion.T, e + 1), chord(position.T, e, e + 1))
+        if not u[0] > 0.0:
+            return True
+    return False
 
 
 @kernel

@@ -33,6 +33,7 @@ class Equilibrium(NamedTuple):
     stable: bool  # the tangent is positive definite
     iterations: int
     residual: float
+    flaw: str  # what an element is where the forces balance in no configuration of a line
 
 
 Led = Callable[[Equilibrium, float, float], Pose]
@@ -108,7 +109,8 @@ def equilibrium(line: Line, water: Water, scales: Scales, pose: Pose, descents: 
     balance, converged, stable, iterations = relax(Balance(line, water, scales, pose), descents)
     factors = Factors(balance, 0.0)
     stiffness = factors.stiffness() if factors.regular else np.full((6, 6), math.nan)
-    return Equilibrium(converged, *balance.pose, balance.top, balance.foot, stiffness, stable, iterations, balance.size)
+    at_ends = balance.top, balance.foot, stiffness
+    return Equilibrium(converged, *balance.pose, *at_ends, stable, iterations, balance.size, balance.flaw())
 
 
 def _catenary(line: Line, s: Array, top: tuple[float, float, float]) -> Pose:

@@ -107,8 +107,8 @@ def bed_reaction(z, diameter, weight):
     return np.where(p < 0, 0.0, np.where(p < diameter / 20, quadratic, linear))
 
 
-def catenary(length, distance, height, s, bed):
-    """Starting shape (x, up, slope, horizontal force over weight per length)."""
+def catenary(length, distance, height, s, bed, least):
+    """Starting shape (x, up, slope, horizontal force over weight per length); the latter at least `least` where there is no bed."""
     ratio = np.sqrt(length**2 - height**2) / distance
     q = brentq(lambda q: np.sinh(q) / q - ratio, 1e-6, 100.0)
     c = distance / (2 * q)
@@ -119,7 +119,7 @@ def catenary(length, distance, height, s, bed):
         x = distance - c * np.arccosh(1 + height / c) + c * np.arcsinh(hung / c)
         x = np.where(hung > 0, x, s)
         return x, np.sqrt(hung**2 + c * c) - c, np.arctan2(hung, c), c
-    start = c * np.sinh(-low / c)
+    start, c = c * np.sinh(-low / c), max(c, least)
     return (
         low + c * np.arcsinh((s + start) / c),
         np.hypot(s + start, c) - np.hypot(start, c),
@@ -193,7 +193,7 @@ def solve(
 
     near = np.linspace(0, 80.0, 81)
     s = np.unique(np.concatenate([np.linspace(0, length, 401), near, length - near])) / length
-    x, up, slope, c = catenary(length, distance, height, s * length, bed)
+    x, up, slope, c = catenary(length, distance, height, s * length, bed, 0.5 * (bending / w) ** (1.0 / 3.0))
     y = np.zeros((13, len(s)))
     y[0], y[2] = x / length, -up / length
     y[3], y[5] = np.cos(slope / 2), np.sin(slope / 2)

@@ -1,9 +1,13 @@
 """Two hundred lines at rest: three steel pipes, a cable and a hose, from nearly vertical to nearly taut, in 50 to 3000 m of water.
 
 A full factorial of line, depth, distance and bed; length over depth, current, foot and departure run through their values beside it.
+
+`python tests/statics_grid.py [COARSE FINE [NUMBER ...]]` compares all of them, or those numbered, on two meshes (48 and 200 nodes): top
+force and largest bending moment, hanging and turned.
 """
 
 import math
+import sys
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -62,9 +66,36 @@ def scenes() -> list[Scene]:
     return out
 
 
-def equilibrium(scene: Scene):
+def equilibrium(scene: Scene, nodes: int = 48):
     """(pipe, hanging equilibrium, equilibrium with the top section turned)."""
-    pipe = Pipe(scene.parameters)
+    pipe = Pipe(replace(scene.parameters, nodes=nodes))
     hung = pipe.equilibrium(scene.parameters.top_position, None)
     held = times(rotation_vector_quaternion(scene.turn), hung.quaternion[-1])
     return pipe, hung, pipe.equilibrium(scene.parameters.top_position, np.array(held))
+
+
+def figures(pipe, found):
+    """(size of the force at the top, largest bending moment) of an equilibrium; NaN if it is none or not stable."""
+    if not (found.converged and found.stable):
+        return math.nan, math.nan
+    return float(np.linalg.norm(found.top[:3])), pipe.largest_bending_moment(pipe.section_forces(pipe.at_rest(found)))
+
+
+def differences(coarse, fine):
+    """Relative differences of two `figures`, over those of the `fine` mesh."""
+    return [abs(a - b) / b for a, b in zip(coarse, fine, strict=True)]
+
+
+def main(coarse: int = 48, fine: int = 200, *numbers: int) -> None:
+    """Print the differences between two meshes, line by line and the largest of all."""
+    every, all_scenes = [], scenes()
+    for number in numbers or range(len(all_scenes)):
+        (pipe, *two), (finer, *same) = (equilibrium(all_scenes[number], nodes) for nodes in (coarse, fine))
+        pairs = [differences(figures(pipe, a), figures(finer, b)) for a, b in zip(two, same, strict=True)]
+        every.append(np.ravel(pairs))
+        print(*(f"{value:8.1e}" for value in every[-1]), all_scenes[number].name, flush=True)
+    print(*(f"{value:8.1e}" for value in np.max(every, axis=0)), "largest; hanging force, moment; turned force, moment")
+
+
+if __name__ == "__main__":
+    main(*(int(word) for word in sys.argv[1:]))

@@ -24,13 +24,19 @@ def hat(v):
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
-def pose(bend, seed=3):
+CHORDS = [pytest.param((1.02 * LENGTH, 0.21, -0.34), id="small-angle")]
+for _angle in (80.0, 100.0, 150.0):  # deg, between the chord and t1
+    _along, _across = 0.9 * LENGTH * math.cos(math.radians(_angle)), 0.9 * LENGTH * math.sin(math.radians(_angle))
+    CHORDS.append(pytest.param((_along, 0.6 * _across, -0.8 * _across), id=f"{_angle:g}-degrees"))
+
+
+def pose(bend, chord=(1.02 * LENGTH, 0.21, -0.34), seed=3):
     """(q1, q2, d): an element turned anywhere, with the relative rotation `bend` and a chord off the mid frame."""
     random = np.random.default_rng(seed)
     q1 = rotation_vector_quaternion(random.normal(size=3))
     q2 = times(q1, rotation_vector_quaternion(bend))
     mid = rotation(times(q1, rotation_vector_quaternion(0.5 * np.array(bend))))
-    return q1, q2, mid @ np.array([1.02 * LENGTH, 0.21, -0.34])
+    return q1, q2, mid @ np.array(chord)
 
 
 def strains(q1, q2, d, share):
@@ -55,43 +61,56 @@ def moved(q1, q2, d, motion):
     )
 
 
-def central(function, step=2e-5):
-    """Derivative of `function` of nine with respect to each of them."""
+def central(function, step=5e-4):
+    """Derivative of `function` of nine with respect to each of them, by differences of fourth order."""
     columns = []
-    for k in range(9):
-        motion = np.zeros(9)
-        motion[k] = step
-        columns.append((function(motion) - function(-motion)) / (2 * step))
+    for motion in step * np.eye(9):
+        near, far = (function(k * motion) - function(-k * motion) for k in (1.0, 2.0))
+        columns.append((8.0 * near - far) / (12.0 * step))
     return np.stack(columns, axis=-1)
 
 
+@pytest.mark.parametrize("chord", CHORDS)
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("bend", BENDS)
-def test_strain_gradients_are_central_differences(bend, share):
-    at = pose(bend)
+def test_strain_gradients_are_central_differences(bend, share, chord):
+    at = pose(bend, chord)
     expected = central(lambda motion: strains(*moved(*at, motion), share))
-    np.testing.assert_allclose(gradients(*at, share), expected, rtol=1e-8, atol=3e-9)  # step^2 = 4e-10 and 1e-16 / step = 5e-12
+    np.testing.assert_allclose(gradients(*at, share), expected, rtol=1e-9, atol=1e-10)
 
 
+@pytest.mark.parametrize("chord", CHORDS)
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("bend", BENDS)
-def test_geometric_stiffness_is_the_derivative_of_the_gradients(bend, share):
-    at = pose(bend)
+def test_geometric_stiffness_is_the_derivative_of_the_gradients(bend, share, chord):
+    at = pose(bend, chord)
     stress = np.array([3.0, -1.2, 0.7, 2.1, -0.8, 1.7, 0.9])
     got = np.empty((9, 9))
     geometric_stiffness.geometric_stiffness(*element.frame(*(tuple(x) for x in at)), LENGTH, share, stress, got)
     expected = central(lambda motion: stress @ gradients(*moved(*at, motion), share))
-    np.testing.assert_allclose(got, expected, atol=2e-8 * np.abs(expected).max())  # step^2 and 1e-15 / step
+    np.testing.assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("chord", CHORDS)
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("bend", BENDS)
-def test_resultant_is_the_stress_times_the_gradients(bend, share):
-    at = pose(bend)
+def test_resultant_is_the_stress_times_the_gradients(bend, share, chord):
+    at = pose(bend, chord)
     stress = np.array([3.0, -1.2, 0.7, 2.1, -0.8, 1.7, 0.9])
     got = np.empty(9)
     element.resultant(*element.frame(*(tuple(x) for x in at)), LENGTH, share, stress, got)
     np.testing.assert_allclose(got, stress @ gradients(*at, share), atol=1e-13 * np.abs(got).max())
+
+
+@pytest.mark.parametrize("angle", [1.0, 30.0, 80.0, 100.0, 150.0, 179.0])
+def test_shear_is_twice_the_tangent_of_half_the_angle_of_the_chord_and_tension_counts_its_sine(angle):
+    """A straight element: nothing but the angle a between chord and sections; the extension by bending is a tenth of 4 sin^2(a / 2)."""
+    a, size = math.radians(angle), 0.9
+    q1, q2, d = pose((0.0, 0.0, 0.0), LENGTH * size * np.array([math.cos(a), 0.6 * math.sin(a), -0.8 * math.sin(a)]))
+    got = strains(q1, q2, d, np.full(2, 0.97))
+    np.testing.assert_allclose(got[1:3], 2.0 * size * math.tan(0.5 * a) * np.array([0.6, -0.8]), rtol=1e-10)
+    assert got[0] == pytest.approx(size - 1.0 + 0.4 * (0.97 * size * math.sin(0.5 * a)) ** 2, rel=1e-12)
+    np.testing.assert_allclose(got[3:6], 0.0, atol=1e-15)
 
 
 @pytest.mark.parametrize("turn", [(0.7, -0.2, 0.4), (0.0, math.pi / 2, 0.0), (-2.0, 1.5, 1.0)])
