@@ -45,13 +45,15 @@ def equilibrium(scene: Scene) -> Prepared:
     start = scene.sections.start
     environment = scene.mapping["environment"]
     depth = _checked(Environment, environment, "environment").depth
-    pipe = _resolved(_pipe(scene, (start.x, start.y, -depth if start.z is None else start.z)))
+    pipe = _pipe(scene, (start.x, start.y, -depth if start.z is None else start.z))
+    held = None if start.departure is None else Rotation.from_euler("ZY", [start.yaw, start.departure])
     if scene.sections.vessel is None:
-        attitude = None if start.departure is None else Rotation.from_euler("zy", [start.yaw, start.departure])
-        found = _hang(Pipe(pipe), np.array(pipe.top_position), attitude)
+        pipe = _resolved(pipe, np.array(pipe.top_position), held)
+        found = _hang(Pipe(pipe), np.array(pipe.top_position), held)
         return Prepared(_placed(pipe, found), None, found)
     vessel = _checked(VesselParameters, scene.mapping["vessel"] | {"environment": environment}, "vessel")
-    return _floating(scene, pipe, vessel)
+    even_keel = np.array([start.x, start.y, vessel.hang_off[2] - depth])
+    return _floating(scene, _resolved(pipe, even_keel, held), vessel)
 
 
 def released(scene: Scene, at: Prepared) -> Prepared:
@@ -193,9 +195,11 @@ def _replaced(unit: str, parameters: P, **changes: Any) -> P:
         raise UsageError(f"{unit}.{error}") from None
 
 
-def _resolved(parameters: PipeParameters) -> PipeParameters:
+def _resolved(pipe: PipeParameters, point: np.ndarray, attitude: Rotation | None) -> PipeParameters:
+    """The pipe with its nodes placed for its top at `point`, its section at `attitude`, or as it hangs if None."""
+    quaternion = np.zeros(4) if attitude is None else np.roll(attitude.as_quat(), 1)
     try:
-        return resolve(parameters)
+        return resolve(_posed(pipe, point, quaternion))
     except ValueError as error:
         raise UsageError(f"pipe.{error}") from None
 
