@@ -166,8 +166,12 @@ def _hang(pipe: Pipe, point: np.ndarray, attitude: Rotation | None) -> Equilibri
 
 
 def _pipe(scene: Scene, top: tuple[float, float, float]) -> PipeParameters:
-    """The scene's pipe hanging from `top` [m]; each of its `sections` has what it does not say itself from `section`."""
-    mapping, (x, y, z) = scene.mapping["pipe"], top
+    """The scene's pipe hanging from `top` [m]; each of its `sections` has what it does not say itself from `section`, and its mesh suits
+    the amplitude of [top_motion] where it gives none itself.
+    """
+    mapping, (x, y, z), motion = scene.mapping["pipe"], top, scene.sections.top_motion
+    if motion is not None:
+        mapping = {"top_amplitude": math.hypot(*motion.amplitude)} | mapping
     common, sections = mapping.get("section", {}), mapping.get("sections")
     if isinstance(common, dict) and isinstance(sections, list):
         mapping = mapping | {"sections": [common | entry if isinstance(entry, dict) else entry for entry in sections]}

@@ -48,3 +48,32 @@ def resting(count, seed=40):
     """`count` random lines with a tolerance."""
     random = np.random.default_rng(seed)
     return [replace(random_line(random), tolerance=float(random.choice(TOLERANCES))) for _ in range(count)]
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A line whose top swings about its start by `amplitude` (3,) [m] with `period` [s], faded in over two periods."""
+
+    name: str
+    parameters: PipeParameters
+    amplitude: tuple[float, float, float]
+    period: float
+
+    def motion(self, time):
+        """(displacement, turn) of the top."""
+        fade = 0.5 * (1.0 - math.cos(math.pi * min(time / (2.0 * self.period), 1.0)))
+        return fade * math.sin(2.0 * math.pi * time / self.period) * np.array(self.amplitude), 0.0
+
+
+def moving(count, seed=8):
+    """`count` random lines with a moving top; none comes nearer to taut than nine tenths of its slack."""
+    random, out = np.random.default_rng(seed), []
+    while len(out) < count:
+        parameters = random_line(random)
+        size, direction, period = random.uniform(0.5, 4.0), random.normal(size=3) * [0.6, 0.4, 1.0], random.uniform(6.0, 14.0)
+        amplitude = size * direction / np.linalg.norm(direction)
+        farthest = max(np.linalg.norm(np.array(parameters.top_position) + sign * amplitude) for sign in (-1.0, 1.0))
+        slack = parameters.length - np.linalg.norm(parameters.top_position)
+        if farthest < parameters.length - 0.1 * slack:
+            out.append(Moving(f"random {len(out)}", parameters, tuple(amplitude.tolist()), period))
+    return out
