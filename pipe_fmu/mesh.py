@@ -3,9 +3,9 @@
 The element is fourth-order accurate, so its error is spread evenly where the fourth power of its length follows the second derivative of
 the bending moment m(S): the mesh equidistributes |m''|^(1/4), taken from static solutions on a fine mesh (the largest of them all where the
 top has a range), spread over the bending length sqrt(EI / T) so that it stays good when the touchdown point or the top moves, and never
-falling below a share of its mean. Where the top oscillates, the waves it sends along the line need elements everywhere, of nearly the same
-length from one to the next: most of the density is even, and the monitor is spread farther. Before there is a solution the clamped ends are refined by their bending length. Sections begin and end
-at nodes.
+falling below a share of its mean. Where the top oscillates, the waves it sends along the line need elements everywhere, and of nearly the
+same length from one to the next: most of the density is even, and the monitor is spread farther. Before there is a solution the clamped
+ends are refined by their bending length. Sections begin and end at nodes.
 """
 
 import math

@@ -96,10 +96,10 @@ def _error(parameters: PipeParameters, s: Array, parts: int) -> float:
     moment and, over that, of the bending moments at both ends; against elements each divided into so many parts.
     """
     finer = np.append((s[:-1, None] + np.outer(np.diff(s), np.arange(parts) / parts)).ravel(), s[-1])
-    found = [_at_rest(parameters, nodes) for nodes in (s, finer)]
-    if found[0] is None or found[1] is None:
+    coarse, fine = _at_rest(parameters, s), _at_rest(parameters, finer)
+    if coarse is None or fine is None:
         return math.inf
-    forces, right = (recovery.SectionForces.of(one) for one in found)
+    forces, right = recovery.SectionForces.of(coarse), recovery.SectionForces.of(fine)
     largest = recovery.largest_bending_moment(finer, right)
     tension = np.abs(forces.tension[[0, -1]] / right.tension[[0, -1]] - 1.0)
     ends = np.linalg.norm((forces.moment - right.moment[::parts])[[0, -1], 1:], axis=1) / largest

@@ -1,4 +1,4 @@
-"""Where the nodes stand: a tolerance is kept at rest, whatever the attitude of the top, and in motion nothing is lost against equal lengths.
+"""Where the nodes stand: a tolerance is kept at rest whatever the attitude of the top, nothing is lost in motion against equal lengths.
 
 Random lines are a sample here; all of them with `EVERY_LINE=1 python -m pytest tests/test_mesh.py`.
 """
@@ -30,7 +30,7 @@ def at_rest(parameters):
 
 
 def error(parameters):
-    """Largest relative error of the tensions and of the largest moment, and over that of the end moments, against ten times the elements."""
+    """Largest relative error of tensions and largest moment, and over that of the end moments, against ten times the elements."""
     tension, largest, ends = at_rest(parameters)
     right, greatest, wanted = at_rest(replace(parameters, nodes=10 * parameters.nodes, nodes_at=()))
     return max(*np.abs(tension / right - 1), abs(largest / greatest - 1), *np.linalg.norm(ends - wanted, axis=1) / greatest)
@@ -99,7 +99,7 @@ def test_in_motion_the_adapted_mesh_is_as_good_as_equal_lengths_or_better(line):
     adapted, exact = (history(line, nodes=nodes, top_amplitude=float(np.linalg.norm(line.amplitude))) for nodes in (48, 193))
     even = history(line, nodes=48, mesh="uniform")
     ratio = distance(adapted, exact) / distance(even, exact)
-    sys.stdout.write(f"{line.name}: position {ratio[0]:.2f}, top force {ratio[1]:.2f}, bending moment {ratio[2]:.2f} of even lengths' error\n")
+    sys.stdout.write("{}: error over that of equal lengths {:.2f} position, {:.2f} top force, {:.2f} moment\n".format(line.name, *ratio))
     assert (ratio < 1.3).all()
     assert ratio.prod() < 1.02  # all in all no loss anywhere
 
