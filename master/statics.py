@@ -46,13 +46,15 @@ def equilibrium(scene: Scene) -> Prepared:
     start = scene.sections.start
     environment = scene.mapping["environment"]
     depth = _checked(Environment, environment, "environment").depth
-    pipe = _resolved(_pipe(scene, (start.x, start.y, -depth if start.z is None else start.z)))
+    pipe = _pipe(scene, (start.x, start.y, -depth if start.z is None else start.z))
+    held = None if start.departure is None else Rotation.from_euler("ZY", [start.yaw, start.departure])
     if scene.sections.vessel is None:
-        attitude = None if start.departure is None else Rotation.from_euler("ZY", [start.yaw, start.departure])
-        found = _hang(Pipe(pipe), np.array(pipe.top_position), attitude)
+        pipe = _resolved(pipe, np.array(pipe.top_position), held)
+        found = _hang(Pipe(pipe), np.array(pipe.top_position), held)
         return Prepared(_placed(pipe, found), None, found)
     vessel = _checked(VesselParameters, scene.mapping["vessel"] | {"environment": environment}, "vessel")
-    return _floating(scene, pipe, vessel)
+    even_keel = np.array([start.x, start.y, vessel.hang_off[2] - depth])
+    return _floating(scene, _resolved(pipe, even_keel, held), vessel)
 
 
 def released(scene: Scene, at: Prepared) -> Prepared:
@@ -167,8 +169,12 @@ def _hang(pipe: Pipe, point: np.ndarray, attitude: Rotation | None) -> Equilibri
 
 
 def _pipe(scene: Scene, top: tuple[float, float, float]) -> PipeParameters:
-    """The scene's pipe hanging from `top` [m]; each of its `sections` has what it does not say itself from `section`."""
-    mapping, (x, y, z) = scene.mapping["pipe"], top
+    """The scene's pipe hanging from `top` [m]; each of its `sections` has what it does not say itself from `section`, and its mesh suits
+    the amplitude of [top_motion] where it gives none itself.
+    """
+    mapping, (x, y, z), motion = scene.mapping["pipe"], top, scene.sections.top_motion
+    if motion is not None:
+        mapping = {"top_amplitude": math.hypot(*motion.amplitude)} | mapping
     common, sections = mapping.get("section", {}), mapping.get("sections")
     if isinstance(common, dict) and isinstance(sections, list):
         mapping = mapping | {"sections": [common | entry if isinstance(entry, dict) else entry for entry in sections]}
@@ -196,9 +202,11 @@ def _replaced(unit: str, parameters: P, **changes: Any) -> P:
         raise UsageError(f"{unit}.{error}") from None
 
 
-def _resolved(parameters: PipeParameters) -> PipeParameters:
+def _resolved(pipe: PipeParameters, point: np.ndarray, attitude: Rotation | None) -> PipeParameters:
+    """The pipe with its nodes placed for its top at `point`, its section at `attitude`, or as it hangs if None."""
+    quaternion = np.zeros(4) if attitude is None else np.roll(attitude.as_quat(), 1)
     try:
-        return resolve(parameters)
+        return resolve(_posed(pipe, point, quaternion))
     except ValueError as error:
         raise UsageError(f"pipe.{error}") from None
 

@@ -3,8 +3,9 @@
 The element is fourth-order accurate, so its error is spread evenly where the fourth power of its length follows the second derivative of
 the bending moment m(S): the mesh equidistributes |m''|^(1/4), taken from static solutions on a fine mesh (the largest of them all where the
 top has a range), spread over the bending length sqrt(EI / T) so that it stays good when the touchdown point or the top moves, and never
-falling below a share of its mean. Before there is a solution the clamped ends are refined by their bending length. Sections begin and end
-at nodes.
+falling below a share of its mean. Where the top oscillates, the waves it sends along the line need elements everywhere, and of nearly the
+same length from one to the next: most of the density is even, and the monitor is spread farther. Before there is a solution the clamped
+ends are refined by their bending length. Sections begin and end at nodes.
 """
 
 import math
@@ -21,7 +22,9 @@ _REACH = 3.0  # its growth distance over the bending length
 _FINEST = 0.08  # never shorter than this share of the even element
 _ORDER = 4.0
 _SPREAD = 1.5  # reach of a maximum of the monitor over the bending length
+_SPREAD_FOR_WAVES = 3.0
 _FLOOR = 0.2  # of the monitor's mean
+_FLOOR_FOR_WAVES = 4.0  # of the spread monitor's mean: no element is longer than 5/4 of the even one
 
 Size = Callable[[Array], Array]
 
@@ -60,12 +63,14 @@ def adapted(parameters: PipeParameters, s: Array, moment: Array, bending_length:
     for end, kind in ((0, parameters.foot), (-1, parameters.top)):
         if kind == "clamped":  # whatever it carries at rest, the end of a moving line is bent within its bending length
             monitor[end] = max(monitor[end], total / count / max(_FINE * bending_length[end], _FINEST * s[-1] / count))
-    decay = np.exp(-np.diff(s) / (_SPREAD * bending_length.max()))
+    waves = parameters.top_amplitude > 0.0
+    decay = np.exp(-np.diff(s) / ((_SPREAD_FOR_WAVES if waves else _SPREAD) * bending_length.max()))
     for i in range(1, len(s)):
         monitor[i] = max(monitor[i], monitor[i - 1] * decay[i - 1])
     for i in range(len(s) - 2, -1, -1):
         monitor[i] = max(monitor[i], monitor[i + 1] * decay[i])
-    monitor += max(_FLOOR * total / s[-1], 1e-300)
+    floor = _FLOOR_FOR_WAVES * float(np.trapezoid(monitor, s)) if waves else _FLOOR * total
+    monitor += max(floor / s[-1], 1e-300)
     return _distribute(parameters, lambda at: 1.0 / np.interp(at, s, monitor), count)
 
 

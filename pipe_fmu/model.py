@@ -15,6 +15,8 @@ from .step_kernel import element_strains
 _PROBE = (4, 8)  # elements of the probing mesh for one of the mesh to be made; the finer where the other finds no equilibrium,
 _PROBE_LIMIT = 2000  # as long as there are fewer than these
 _TRIES = (12, 16, 24, 32, 47, 64, 96, 128, 192, 256, 384, 512, 768, 1024)  # elements tried for a tolerance
+_PARTS = (2, 10)  # of an element, in the meshes that a tolerance is measured against: the first tells soon, the second for certain
+_MARGIN = 0.9  # of the tolerance, which the error of the finer mesh may use up
 
 
 def resolve(parameters: PipeParameters) -> PipeParameters:
@@ -30,11 +32,9 @@ def resolve(parameters: PipeParameters) -> PipeParameters:
     for count in _TRIES:
         if count < len(parameters.all_sections):
             continue
-        trial = _placed(parameters, _mesh(parameters, count))
-        found = _characteristics(trial)
-        finer = _characteristics(_placed(parameters, _mesh(parameters, 2 * count)))
-        if found is not None and finer is not None and np.abs(found / finer - 1.0).max() <= parameters.tolerance:
-            return trial
+        s = _mesh(parameters, count)
+        if all(_error(pose, s, parts) <= _MARGIN * parameters.tolerance for parts in _PARTS for pose in _range(parameters)):
+            return _placed(parameters, s)
     raise ValueError(f"tolerance = {parameters.tolerance:g}: must be within reach of {_TRIES[-1]} elements")
 
 
@@ -92,20 +92,19 @@ def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
     return section_forces.nodal_wrenches(line, mass, calm, found.position, found.quaternion, zero, zero, strain)
 
 
-def _characteristics(parameters: PipeParameters) -> Array | None:
-    """What a tolerance is measured by, everywhere in the top's range: tension at both ends, largest bending moment, and the end moments
-    beside it."""
-    s = np.array(parameters.nodes_at)
-    found = []
-    for pose in _range(parameters):
-        solved = _at_rest(pose, s)
-        if solved is None:
-            return None
-        forces = section_forces.SectionForces.of(solved)
-        largest = section_forces.largest_bending_moment(s, forces)
-        ends = [largest + float(np.hypot(*forces.moment[at, 1:])) for at in (0, -1)]
-        found.append([forces.tension[0], forces.tension[-1], largest, *ends])
-    return np.array(found)
+def _error(parameters: PipeParameters, s: Array, parts: int) -> float:
+    """Largest relative error on the nodes `s` (n,), inf where there is no equilibrium: of the tension at both ends, of the largest bending
+    moment and, over that, of the bending moments at both ends; against elements each divided into so many parts.
+    """
+    finer = np.append((s[:-1, None] + np.outer(np.diff(s), np.arange(parts) / parts)).ravel(), s[-1])
+    coarse, fine = _at_rest(parameters, s), _at_rest(parameters, finer)
+    if coarse is None or fine is None:
+        return math.inf
+    forces, right = section_forces.SectionForces.of(coarse), section_forces.SectionForces.of(fine)
+    largest = section_forces.largest_bending_moment(finer, right)
+    tension = np.abs(forces.tension[[0, -1]] / right.tension[[0, -1]] - 1.0)
+    ends = np.linalg.norm((forces.moment - right.moment[::parts])[[0, -1], 1:], axis=1) / largest
+    return float(max(*tension, abs(section_forces.largest_bending_moment(s, forces) / largest - 1.0), *ends))
 
 
 def _placed(parameters: PipeParameters, s: Array) -> PipeParameters:

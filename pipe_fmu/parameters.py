@@ -157,6 +157,7 @@ class PipeParameters:
         (1.0, 0.0, 0.0, 0.0), "1", "start attitude of the top section, scalar first; all zero: as it hangs", min=-1.0, max=1.0
     )
     top_range: float = number(0.0, "m", "how far the top moves to and from the foot: the mesh suits all of it", min=0.0)
+    top_amplitude: float = number(0.0, "m", "amplitude with which the top oscillates: the mesh suits the waves it sends", min=0.0)
     section: Section = field(default_factory=Section, metadata={"doc": "the section, where there is one"})
     sections: tuple[Section, ...] = field(default=(), metadata={"doc": "sections from foot to top, instead of `section`"})
     internal_damping: float = number(0.0, "s", "Kelvin-Voigt time: viscous section forces are this times C strain rate", min=0.0)

@@ -20,7 +20,7 @@ from master.benchmarks.histories import Histories, LineCase, Setting
 from master.errors import RunError
 from master.hard_cases import cases, swing
 
-PIPE = replace(next(case.pipe for case in cases() if case.name == "snap, slack to taut"), nodes=49)
+PIPE = replace(next(case.pipe for case in cases() if case.name == "snap, slack to taut"), nodes=49, top_amplitude=2.0)
 OWN, UNIFORM, FMU = "step", "step, uniform mesh", "FMU and master"
 EXUDYN, BARE, MOORDYN, PAPER = "Exudyn ANCF", "Exudyn without drag", "MoorDyn RK4", "paper's method"
 CONTESTANTS = {
