@@ -13,10 +13,7 @@ QUARTERS = np.linspace(0.1, 0.9, 9)  # of the length, where positions are compar
 
 @dataclass(frozen=True)
 class History:
-    """Nodes `s` (n,), and at k instants: positions (k, 9, 3), top forces (k, 3), bending moments integrated from the foot (k, n, 2) [N m2].
-
-    The integral's increase over an element is EI times the rotation of its ends: what an element knows without recovery.
-    """
+    """Nodes `s` (n,), and at k instants: positions (k, 9, 3), top forces (k, 3), bending moments at the nodes (k, n, 2) [N m]."""
 
     s: np.ndarray
     position: np.ndarray
@@ -30,13 +27,11 @@ def history(moving, **mesh):
     states, results = march(pipe, state, moving.motion, STEP, round(DURATION / STEP))
     kept, length = states[EVERY:-1:EVERY], pipe.s[-1]
     forces = np.array([result.top[:3] for result in results])
-    stiffness = (pipe.line.stiffness[:, 4:6] * pipe.line.length[:, None])[None]
-    steps = stiffness * np.array([one.strain[:, 4:6] for one in kept])
     return History(
         pipe.s,
         np.array([_positions(pipe.s, one, QUARTERS * length) for one in kept]),
         0.5 * (forces[EVERY - 1 : -1 : EVERY] + forces[EVERY::EVERY])[: len(kept)],
-        np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1),
+        np.array([pipe.section_forces(one).moment[:, 1:] for one in kept]),
     )
 
 
@@ -46,11 +41,9 @@ def _positions(s, state, at):
 
 
 def distance(found, right):
-    """Root mean squares over time of the errors in position [m], in top force [N] and in the elements' mean bending moments [N m]."""
-    lengths = np.diff(found.s)
-    wanted = np.diff(CubicSpline(right.s, right.bending, axis=1)(found.s), axis=1)
-    moment = (np.diff(found.bending, axis=1) - wanted) / lengths[:, None]
-    along = np.sum(np.sum(moment**2, axis=2) * lengths, axis=1) / found.s[-1]
+    """Root mean squares over time of the errors in position [m], in top force [N] and in the bending moment along the line [N m]."""
+    moment = found.bending - CubicSpline(right.s, right.bending, axis=1)(found.s)
+    along = np.trapezoid(np.sum(moment**2, axis=2), found.s, axis=1) / found.s[-1]
     return np.array([_rms(found.position - right.position), _rms(found.top - right.top), np.sqrt(np.mean(along))])
 
 
