@@ -32,7 +32,13 @@ class Equilibrium(NamedTuple):
     stiffness: Array  # (6, 6) d top / d (displacement, spin) of the top
     stable: bool  # the tangent is positive definite
     iterations: int
-    residual: float
+    residual: float  # largest force not in balance, over the weight or the force at an end, whichever is largest
+    worst: int  # the node it is at
+
+    def unbalance(self, s: Array) -> str:
+        """What is not in balance, in words; s (n,): arc lengths of the nodes."""
+        largest = f"residual {self.residual:.1e} of the weight or end force at s = {s[self.worst]:.6g} m"
+        return f"{largest} after {self.iterations} corrections"
 
 
 Led = Callable[[Equilibrium, float, float], Pose]
@@ -108,12 +114,13 @@ def equilibrium(line: Line, water: Water, scales: Scales, pose: Pose, descents: 
     balance, converged, stable, iterations = relax(Balance(line, water, scales, pose), descents)
     factors = Factors(balance, 0.0)
     stiffness = factors.stiffness() if factors.regular else np.full((6, 6), math.nan)
-    return Equilibrium(converged, *balance.pose, balance.top, balance.foot, stiffness, stable, iterations, balance.size)
+    return Equilibrium(converged, *balance.pose, balance.top, balance.foot, stiffness, stable, iterations, balance.size, balance.worst)
 
 
 def _catenary(line: Line, s: Array, top: tuple[float, float, float]) -> Pose:
     """Pose in which the search starts."""
-    position, quaternion = catenary.shape(s, float(s[-1]), top, line.bed.shape[0] > 0)
+    floats = float(line.weight @ line.length) < 0.0
+    position, quaternion = catenary.shape(s, float(s[-1]), top, line.bed.shape[0] > 0, floats)
     if line.foot_clamped:
         quaternion[0] = (1.0, 0.0, 0.0, 0.0)
     return position, quaternion
