@@ -4,12 +4,12 @@ catenary, mirror image, bar.
 """
 
 import math
-import warnings
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from pipe_helpers import HANGING, P16
+from pipe_helpers import HANGING, P16, balance, march
 from random_lines import draw, judge
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
@@ -17,7 +17,7 @@ from scipy.special import ellipe, ellipk
 from pipe_fmu import Pipe, PipeParameters, PipeUnit, Seabed, Section
 from pipe_fmu.environment import Environment
 
-warnings.simplefilter("error")
+pytestmark = pytest.mark.filterwarnings("error")
 
 
 def pinned(length, top, section, depth=300.0, water=1025.0, **changes):
@@ -196,6 +196,16 @@ def test_a_pipe_lies_at_zero_on_a_bed_for_its_weight_and_sinks_as_the_law_says_o
         parameters = pinned(1200.0, (800.0, 0.0, -300.0), P16, 550.0, seabed=Seabed(reference_weight=reference))
         pipe, found = at_rest(parameters)
         assert found.position[np.searchsorted(pipe.s, 250.0), 2] == pytest.approx(depth, abs=1e-3)
+
+
+def test_a_line_with_modules_moves_over_its_bed_by_the_energy_identity():
+    """It starts at rest, lying on a bed that is softer than its own weight asks for, and its top is moved to and fro."""
+    pipe, found = at_rest(lazy_wave(True, reference=300.0, nodes=60))
+    states, _ = march(pipe, pipe.at_rest(found), lambda t: (np.array([0.0, 0.0, 1.0 - math.cos(0.6 * t)]), 0.0), 0.1, 20)
+    for old, new in pairwise(states):
+        created, allowed = balance(pipe, old, new)
+        assert abs(created) < allowed
+    assert pipe.energies(states[0])[3] != pipe.energies(states[-1])[3]
 
 
 def test_statics_that_find_nothing_name_the_residual_what_it_is_measured_by_and_where(monkeypatch):
