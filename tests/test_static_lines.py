@@ -219,4 +219,4 @@ def test_statics_that_find_nothing_name_the_residual_what_it_is_measured_by_and_
 @pytest.mark.parametrize("number", range(60))
 def test_a_random_line_is_found_stable_not_inverted_and_right(number):
     """Against a mesh four times finer."""
-    assert judge(draw(number), 24).faults == []
+    assert judge(draw(number)).faults == []
