@@ -160,10 +160,9 @@ def _hang(pipe: Pipe, point: np.ndarray, attitude: Rotation | None) -> Equilibri
     held = None if attitude is None else np.roll(attitude.as_quat(), 1)
     found = pipe.equilibrium(_three(point), held, 0.0)
     if not found.converged:
-        flaw = f"; an element is {found.flaw}" if found.flaw else ""
         raise RunError(
             f"statics: the pipe finds no equilibrium with its top at {tuple(np.round(point, 3).tolist())} m: "
-            f"residual {found.residual:.1e} of its weight after {found.iterations} corrections{flaw}"
+            f"{found.unbalance(pipe.s)}"
         )
     return found
 
@@ -180,9 +179,10 @@ def _pipe(scene: Scene, top: tuple[float, float, float]) -> PipeParameters:
         mapping = mapping | {"sections": [common | entry if isinstance(entry, dict) else entry for entry in sections]}
     above = {"top_position": [0.0, 0.0, z], "top_quaternion": [0.0] * 4, "environment": scene.mapping["environment"]}
     pipe = _checked(PipeParameters, mapping | above, "pipe")  # over the foot first: a pipe that is too short even there is named
-    if pipe.length <= (distance := math.hypot(*top)):
+    if (distance := math.hypot(*top)) > pipe.longest:
         name, value = ("start.x", x) if abs(x) >= abs(y) else ("start.y", y)
-        rule = f"must keep the distance from foot to top, {distance:.6g} m, below pipe.length = {pipe.length:g} m"
+        most = f"at most {pipe.longest:.6g} m, to which pipe.length = {pipe.length:g} m can be stretched"
+        rule = f"must keep the distance from foot to top, {distance:.6g} m, {most}"
         raise UsageError(f"{name} = {value:g}: {rule}")
     return _replaced("pipe", pipe, top_position=top)
 

@@ -17,13 +17,15 @@ def parameter(length: float, distance: float, height: float, on_bed: bool) -> tu
     """Horizontal force over weight per length, c [m], and length lying on the bed [m] of an inextensible line.
 
     The line has `length`, its top lies `distance` ahead of and `height` above its foot. With `on_bed` it does not hang below the foot.
+    Infinite where it is not longer than its span.
     """
-    height = max(height, LEAST_HEIGHT * length)
-    chord = math.sqrt(max(length**2 - height**2, 0.0))
+    if on_bed:
+        height = max(height, LEAST_HEIGHT * length)
     distance = max(distance, 1e-6 * length)
-    ratio = chord / distance
-    q = math.sqrt(6.0 * (ratio - 1.0)) if ratio < 1.0 + 1e-12 else _root(lambda q: _sinhc(q) - ratio, 1e-7, 700.0)
-    c = 0.5 * distance / max(q, 1e-7)
+    if is_straight(length, distance, height):
+        return math.inf, 0.0
+    ratio = math.sqrt(length**2 - height**2) / distance
+    c = 0.5 * distance / _root(lambda q: _sinhc(q) - ratio, 1e-7, 700.0)
     lowest = 0.5 * distance - c * math.atanh(height / length)  # where the free line has its lowest point
     if not on_bed or lowest <= 1e-9 * length:
         return c, 0.0
@@ -37,6 +39,18 @@ def parameter(length: float, distance: float, height: float, on_bed: bool) -> tu
         return low, length - height
     c = _root(lambda c: -excess(c), low, 1e6 * height)
     return c, length - math.sqrt(height**2 + 2.0 * height * c)
+
+
+def tension(weight: float, axial: float, stretched: float) -> float:
+    """Tension [N] of a nearly straight line of `weight` [N] across its chord and stiffness `axial` [N], its chord `stretched` times longer
+    than it is at rest: what it is longer than its chord, weight^2 / (24 tension^2) of its length as in a parabola, it is stretched as well.
+    """
+    return _root(lambda t: t / axial - stretched - weight**2 / (24.0 * t**2), 1e-12 * axial, axial)
+
+
+def is_straight(length: float, distance: float, height: float) -> bool:
+    """Whether a line is no longer than its span, but for the last digits."""
+    return length <= (1.0 + 1e-12) * math.hypot(distance, height)
 
 
 def _sinhc(q: float) -> float:
@@ -67,16 +81,21 @@ def _meander(part: Array, span: float) -> tuple[Array, Array, Array]:
     return np.interp(part, fine, along), np.interp(part, fine, aside), np.interp(part, fine, heading)
 
 
-def shape(s: Array, length: float, top: tuple[float, float, float], on_bed: bool) -> tuple[Array, Array]:
+def shape(s: Array, length: float, top: tuple[float, float, float], on_bed: bool, floats: bool = False) -> tuple[Array, Array]:
     """Positions (n, 3) [m] and attitudes (n, 4) of the sections at arc lengths `s` (n,) of a line from the origin to `top`, in e.
 
-    What lies on the bed and is longer than its span meanders.
+    What lies on the bed and is longer than its span meanders. A line that `floats` is the mirror image of one that hangs; one that is
+    shorter than its span is stretched to it.
     """
-    distance, height, heading = math.hypot(top[0], top[1]), -top[2], math.atan2(top[1], top[0])
-    height = max(height, LEAST_HEIGHT * length)
+    distance, heading = math.hypot(top[0], top[1]), math.atan2(top[1], top[0])
+    up_is, on_bed = (-1.0 if floats else 1.0), on_bed and not floats
+    height = max(-top[2], LEAST_HEIGHT * length) if on_bed else -up_is * top[2]
     c, lying = parameter(length, distance, height, on_bed)
     aside, turn = np.zeros_like(s), np.zeros_like(s)
-    if lying > 0.0:
+    if math.isinf(c):
+        forward, up = s / length * distance, s / length * height
+        slope = np.full_like(s, math.atan2(height, distance))
+    elif lying > 0.0:
         c = max(c, min(_LEAST_BEND * height, 0.25 * (length - height)))
         lying = length - math.sqrt(height**2 + 2.0 * height * c)
         forward, aside, turn = _meander(np.minimum(s / lying, 1.0), (distance - c * math.acosh(1.0 + height / c)) / lying)
@@ -85,14 +104,15 @@ def shape(s: Array, length: float, top: tuple[float, float, float], on_bed: bool
         up = np.sqrt(hung**2 + c**2) - c
         slope = np.arctan2(hung, c)
     else:
+        distance = max(distance, 1e-6 * length)
         low = 0.5 * distance - c * math.atanh(height / length)
         at_foot = -c * math.sinh(low / c)
         forward = low + c * np.arcsinh((s + at_foot) / c)
         up = np.hypot(s + at_foot, c) - math.hypot(at_foot, c)
         slope = np.arctan2(s + at_foot, c)
     ahead, across = math.cos(heading), math.sin(heading)
-    position = np.column_stack([forward * ahead - aside * across, forward * across + aside * ahead, -up])
-    turn, slope = 0.5 * (turn + heading), 0.5 * slope
+    position = np.column_stack([forward * ahead - aside * across, forward * across + aside * ahead, -up_is * up])
+    turn, slope = 0.5 * (turn + heading), 0.5 * up_is * slope
     pitch, level = np.sin(slope), np.cos(slope)
     attitude = np.column_stack([np.cos(turn) * level, -np.sin(turn) * pitch, np.cos(turn) * pitch, np.sin(turn) * level])
     position[-1] = top

@@ -77,6 +77,7 @@ def line_columns(line):
         columns(line.stiffness, n, 0.0),
         columns(line.share, n, 1.0),
         column(line.weight, n, 0.0),
+        column(line.bearing, n, 0.0),
         columns(line.drag, n, 0.0),
         column(line.diameter, n, 1.0),
         column(line.mass, n, 0.0),

@@ -118,7 +118,7 @@ def _press_sag(line, first, count, h, old, new, stress):
     """Add the bed's part to what is conjugate to the sag, for the geometric stiffness."""
     for m in range(count):
         e = first + m
-        lane(stress, m)[STRAINS] += bed_on_sag(line.length[e], h, line.diameter[e], line.weight[e], line.bed[0], *_heights(e, old, new))
+        lane(stress, m)[STRAINS] += bed_on_sag(line.length[e], h, line.diameter[e], line.bearing[e], line.bed[0], *_heights(e, old, new))
 
 
 @inner
@@ -126,7 +126,7 @@ def _add_bed(line, first, count, h, old, new, ends, mean, final, fresh, sharp, v
     """Add the bed's reaction to `vector` (12,) and, if `fresh`, `twelve` (12, 12)."""
     for m in range(count):
         e = first + m
-        bed = line.length[e], h, line.diameter[e], line.weight[e], line.bed
+        bed = line.length[e], h, line.diameter[e], line.bearing[e], line.bed
         sag_rows = lane(mean, m)[STRAINS], lane(final, m)[STRAINS]
         into = lane(vector, m), lane(twelve, m), (lane(scratch, m),)
         lane(sums, m)[CONTACT] += add_mean_contact(*bed, *_heights(e, old, new), lane(ends, m), *sag_rows, fresh, sharp, *into)

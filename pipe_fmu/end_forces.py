@@ -77,7 +77,7 @@ def end_forces(line, water, position, quaternion, velocity, spin, strain, ends, 
         for m in range(min(WIDTH, ends.shape[0] - first)):
             e, ours, means = first + m, lane(vector, m), lane(mean, m)
             if line.bed.shape[0] > 0:
-                lies = line.length[e], line.diameter[e], line.weight[e], position[2, e], position[2, e + 1], strain[STRAINS, e]
+                lies = line.length[e], line.diameter[e], line.bearing[e], position[2, e], position[2, e + 1], strain[STRAINS, e]
                 _, on_sag = press(*lies, lane(points, m))
                 add_press(lane(points, m), ours)
                 expand(lane(rows, m)[STRAINS], lane(by_sag, m))

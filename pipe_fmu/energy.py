@@ -17,7 +17,7 @@ def energies(line, position, quaternion, velocity, rate, flow, strain):
             elastic += 0.5 * h * line.stiffness[e, k] * strain[e, k] ** 2
         gravity -= h * line.weight[e] * (0.5 * (position[e, 2] + position[e + 1, 2]) + strain[e, ROWS - 1] / 6.0)
         if line.bed.shape[0] > 0:
-            pressed += contact_potential(h, line.diameter[e], line.weight[e], position[e, 2], position[e + 1, 2], strain[e, ROWS - 1])
+            pressed += contact_potential(h, line.diameter[e], line.bearing[e], position[e, 2], position[e + 1, 2], strain[e, ROWS - 1])
     for i in range(n):
         for k in range(3):
             kinetic += 0.5 * line.mass[i] * velocity[i, k] ** 2

@@ -15,6 +15,7 @@ class Line(NamedTuple):
     stiffness: Array  # (n-1, 6) EA, K_2, K_3 [N], GJ, EI_2, EI_3 [N m^2]; K the chord's shear stiffness (element.py)
     share: Array  # (n-1, 2) p_2, p_3
     weight: Array  # (n-1,) submerged weight per length [N/m], eq. (28)
+    bearing: Array  # (n-1,) weight per length from which the bed's stiffness follows [N/m] (seabed.py)
     drag: Array  # (n-1, 2) rho d D_1 / 2, rho d D_2 / 2 [N s^2/m^3], eq. (29)
     diameter: Array  # (n-1,) outer diameter d [m]
     mass: Array  # (n,) lumped m_P times length [kg]

@@ -134,6 +134,7 @@ def _line(parameters: PipeParameters, s: Array) -> Line:
         stiffness=np.column_stack([stiffness[:, 0], k2, k3, stiffness[:, 2:]]),
         share=np.column_stack([p2, p3]),
         weight=(mass - displaced) * gravity,
+        bearing=_by_section(parameters, s, np.array(parameters.bearing())),
         drag=0.5 * density * diameter[:, None] * section(lambda one: (one.drag_tangential, one.drag_normal)),
         diameter=diameter,
         mass=_lump(mass[:, None], h)[:, 0],
@@ -182,32 +183,38 @@ def waters(parameters: PipeParameters) -> Callable[[float], Water]:
 
 
 def estimate_tension(parameters: PipeParameters) -> tuple[float, float]:
-    """Tension [N] at foot and top of the catenary of the same weight."""
+    """Tension [N] at foot and top of the catenary of the same weight, or of the bar that is stretched, if that gives way first."""
     x, y, z = parameters.top_position
-    weight = _mean_weight(parameters)
-    c, _ = catenary.parameter(parameters.length, float(np.hypot(x, y)), max(-z, 1e-6), parameters.seabed is not None)
-    return abs(weight) * c, abs(weight) * (c + max(-z, 0.0))
+    length, distance, weight = parameters.length, math.hypot(x, y), _mean_weight(parameters)
+    height = -z if weight >= 0.0 else z  # a line that floats is the mirror image of one that hangs
+    c, _ = catenary.parameter(length, distance, height, parameters.seabed is not None and weight > 0.0)
+    least = abs(weight) * c if weight != 0.0 else 0.0
+    axial = min(section.stiffness[0] for section in parameters.all_sections)
+    stretched = math.dist(parameters.top_position, (0.0, 0.0, 0.0)) / length - 1.0
+    if least > -stretched * axial:
+        least = catenary.tension(abs(weight) * distance, axial, stretched)
+    most = least + abs(weight * z)
+    return (least, most) if height >= 0.0 else (most, least)
 
 
 def _mean_weight(parameters: PipeParameters) -> float:
-    environment = parameters.environment
-    total = 0.0
-    for section in parameters.all_sections:
-        per_length = (section.mass_per_length - environment.water_density * section.outer_area) * environment.gravity
-        total += per_length * (section.length or parameters.length)
-    return total / parameters.length
+    sections = parameters.all_sections
+    return sum(parameters.weight(section) * (section.length or parameters.length) for section in sections) / parameters.length
 
 
 def _picker(parameters: PipeParameters, s: Array) -> Callable[[Callable[[Section], object]], Array]:
     """Function that lists a property of the section of every element."""
-    ends = np.cumsum([section.length or parameters.length for section in parameters.all_sections])
-    which = np.searchsorted(ends, 0.5 * (s[1:] + s[:-1]))
-
     def pick(property_of: Callable[[Section], object]) -> Array:
-        table = np.array([property_of(section) for section in parameters.all_sections], dtype=float)
-        return table[which]
+        return _by_section(parameters, s, np.array([property_of(section) for section in parameters.all_sections], dtype=float))
 
     return pick
+
+
+def _by_section(parameters: PipeParameters, s: Array, table: Array) -> Array:
+    """For every element the row of `table` that belongs to its section."""
+    ends = np.cumsum([section.length or parameters.length for section in parameters.all_sections])
+    picked: Array = table[np.searchsorted(ends, 0.5 * (s[1:] + s[:-1]))]
+    return picked
 
 
 def _lump(per_length: Array, h: Array) -> Array:

@@ -15,6 +15,7 @@ from .environment import Environment
 
 Vector3 = tuple[float, float, float]
 End = Literal["clamped", "pinned"]
+MOST_STRETCH = 0.05  # mean strain up to which a line may be stretched: the law (20) is that of small strains
 _SUBSTEPS = (1, 3, 9, 27, 81, 243, 729)
 
 
@@ -124,6 +125,9 @@ class Seabed:
     damping: float = number(1.0, "s/m", "dashpot: share of the elastic reaction per speed of penetration", min=0.0)
     friction: float = number(0.0, "1", "Coulomb coefficient", min=0.0)
     friction_speed: float = number(1e-3, "m/s", "speed below which friction is viscous", above=0.0)
+    reference_weight: float | None = number(
+        None, "N/m", "weight per length that lies at z = 0, from which the stiffness follows, instead of the section's", above=0.0
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -184,27 +188,23 @@ class PipeParameters:
                 raise ValueError(f"length = {self.length:g}: must equal the sum of the sections' lengths, {total:g} m")
         if self.nodes_at:
             self._check_nodes()
-        if self.seabed is not None:
-            self._check_weight()
-        distance = math.dist(self.top_position, (0.0, 0.0, 0.0))
-        if self.length <= distance:
-            raise ValueError(f"length = {self.length:g}: must exceed the distance from foot to top, {distance:.6g} m")
-        farthest = math.hypot(math.hypot(*self.top_position[:2]) + self.top_range, self.top_position[2])
-        if self.top_range > 0.0 and self.length <= farthest:
-            reach = math.sqrt(self.length**2 - self.top_position[2] ** 2) - math.hypot(*self.top_position[:2])
-            raise ValueError(f"top_range = {self.top_range:g}: must be less than {reach:.6g} m, where the line is taut")
+        self._check_reach()
+        if self.seabed is not None and not max(self.bearing()) > 0.0:
+            rule = "must be given where no section is heavier or lighter than water"
+            raise ValueError(f"seabed.reference_weight = nothing: {rule}")
         norm = math.hypot(*self.top_quaternion)
         if norm > 0.0 and abs(norm - 1.0) > 1e-6:
             raise ValueError(f"top_quaternion = {self.top_quaternion!r}: must have length 1, or be all zero")
 
-    def _check_weight(self) -> None:
-        for section in self.all_sections:
-            displaced = self.environment.water_density * section.outer_area
-            if section.mass_per_length <= displaced:
-                raise ValueError(
-                    f"seabed: a section of {section.mass_per_length:.4g} kg/m must weigh more than the {displaced:.4g} kg/m of water it "
-                    "displaces to lie on it"
-                )
+    def _check_reach(self) -> None:
+        distance, depth = math.hypot(*self.top_position[:2]), self.top_position[2]
+        if (span := math.hypot(distance, depth)) > self.longest:
+            rule = f"must be at least {span / (1.0 + MOST_STRETCH):.6g} m, or the line is stretched by more than {MOST_STRETCH:.0%}"
+            raise ValueError(f"length = {self.length:g}: {rule} to the distance from foot to top, {span:.6g} m")
+        if math.hypot(distance + self.top_range, depth) > self.longest:
+            reach = math.sqrt(self.longest**2 - depth**2) - distance
+            rule = f"must be at most {reach:.6g} m, where the line is stretched by {MOST_STRETCH:.0%}"
+            raise ValueError(f"top_range = {self.top_range:g}: {rule}")
 
     def _check_nodes(self) -> None:
         at = self.nodes_at
@@ -214,6 +214,25 @@ class PipeParameters:
         if at[0] != 0.0 or at[-1] != self.length or any(b <= a for a, b in pairwise(at)):
             rule = f"must ascend from 0 to the length {self.length:g} m; an empty one places the nodes anew"
             raise ValueError(f"nodes_at = ({at[0]:g}, ..., {at[-1]:g}): {rule}")
+
+    @property
+    def longest(self) -> float:
+        """Largest distance from foot to top [m]."""
+        return (1.0 + MOST_STRETCH) * self.length
+
+    def weight(self, section: Section) -> float:
+        """Submerged weight per length [N/m] of a section."""
+        return (section.mass_per_length - self.environment.water_density * section.outer_area) * self.environment.gravity
+
+    def bearing(self) -> tuple[float, ...]:
+        """Weight per length [N/m] of every section from which the bed's stiffness under it follows.
+
+        It is the reference weight, or the section's own; for a section that floats, that of the heaviest (of the lightest, if all float).
+        """
+        weights = [self.weight(section) for section in self.all_sections]
+        given = None if self.seabed is None else self.seabed.reference_weight
+        heaviest = max(weights) if max(weights) > 0.0 else -min(weights)
+        return tuple(given or (own if own > 0.0 else heaviest) for own in weights)
 
     @property
     def all_sections(self) -> tuple[Section, ...]:

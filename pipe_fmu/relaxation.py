@@ -20,8 +20,9 @@ import numpy as np
 from .line import Array
 from .static_balance import Balance, Factors, limited
 
-TOLERANCE = 1e-11  # of the line's weight (times its longest element, for moments)
-ROUND_OFF = 1e-7  # accepted once the residual no longer falls
+TOLERANCE = 1e-11  # of the line's weight or largest end force (times its longest element, for moments)
+ROUND_OFF = 1e-7  # accepted once the residual no longer falls,
+_COARSEST = 1e-5  # and where the line is so stiff that its round-off is larger, that up to here
 LOST = 1e12  # residual from which there is no way back
 _CORRECTIONS = 60  # of Newton's method
 DESCENTS = 1000
@@ -54,7 +55,7 @@ def newton(balance: Balance) -> Rest:
     for iteration in range(_CORRECTIONS):
         if not balance.size < LOST:
             break
-        if _resting(balance.size, best):
+        if _resting(balance, best):
             return _rest(balance, balance.stable(), iteration)
         best = min(best, balance.size)
         factors = Factors(balance, 0.0)
@@ -70,8 +71,12 @@ def _rest(balance: Balance, stable: bool, iteration: int) -> Rest:
     return Rest(balance, sound, sound and stable, iteration)
 
 
-def _resting(size: float, best: float) -> bool:
-    return size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * best)
+def _resting(balance: Balance, best: float) -> bool:
+    return balance.size <= TOLERANCE or (balance.size <= _round_off(balance) and balance.size > 0.3 * best)
+
+
+def _round_off(balance: Balance) -> float:
+    return max(ROUND_OFF, min(balance.rounding, _COARSEST))
 
 
 def descend(balance: Balance, limit: int) -> Rest:
@@ -79,7 +84,7 @@ def descend(balance: Balance, limit: int) -> Rest:
     damping, turn, best, iteration = 0.0, _TURN, math.inf, 0
     for iteration in range(limit):
         definite = balance.definite()
-        if _resting(balance.size, best) and (definite or balance.stable()):
+        if _resting(balance, best) and (definite or balance.stable()):
             return _rest(balance, True, iteration)
         best = min(best, balance.size)
         if not definite:
@@ -96,7 +101,7 @@ def descend(balance: Balance, limit: int) -> Rest:
         if ratio > 0.5:
             damping = 0.25 * damping if damping > 4.0 * _LEAST_DAMPING else 0.0
         turn = min(2.0 * turn, _TURN)
-    return _rest(balance, False, iteration) if balance.size <= ROUND_OFF else Rest(balance, False, False, iteration)
+    return _rest(balance, False, iteration) if balance.size <= _round_off(balance) else Rest(balance, False, False, iteration)
 
 
 def _step(balance: Balance, damping: float, turn: float, definite: bool) -> tuple[Balance | None, float]:
@@ -121,7 +126,7 @@ def _step(balance: Balance, damping: float, turn: float, definite: bool) -> tupl
         released = balance.potential - there.potential + work
         if abs(released) < balance.blur:  # only the forces tell
             released = -0.5 * float(((balance.residual + there.residual) * (way + move)).sum())
-        if released > _SHARE * promised or (definite and there.size < 0.5 * balance.size and there.size < ROUND_OFF):
+        if released > _SHARE * promised or (definite and there.size < 0.5 * balance.size and there.size < _round_off(there)):
             return there, released / promised
         here, way = there, way + move if anchored else way
         anchored = True

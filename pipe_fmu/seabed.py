@@ -1,7 +1,7 @@
 """Elastic seabed: potential and force per length of a pipe against the plane z = 0 (e3 down).
 
 The law is linear with a quadratic foot, continuous with its slope. With the penetration p = z + d/8, d the outer diameter and w the
-submerged weight per length,
+submerged weight per length (for a section that floats, that of the heaviest, or one that is given),
 
     force = 0 (p < 0),   10 w p^2 / ((d/8 - d/40) d) (0 <= p <= d/20),   w (p - d/40) / (d/8 - d/40) above,
 

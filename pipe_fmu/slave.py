@@ -108,8 +108,7 @@ class PipeUnit:
         """Find the static equilibrium; a message if there is none."""
         found, state = self._pipe.start(time)
         if not found.converged:
-            flaw = f"; an element is {found.flaw}" if found.flaw else ""
-            return f"statics: no equilibrium after {found.iterations} corrections, residual {found.residual:.2e} of the weight{flaw}"
+            return f"statics: no equilibrium: {found.unbalance(self._pipe.s)}"
         still = np.zeros(3)
         self._pipe.step(state, still, still, 1e-3)  # so that compiling its kernel belongs to the start, not to the first step
         self.state = (state, found.top, found.stiffness, 0, found.residual)

@@ -17,6 +17,8 @@ Pose = tuple[Array, Array]  # positions (n, 3) [m], attitudes (n, 4)
 
 _ROUND_OFF = 1e-12  # of the sum of absolute potentials
 _NEUTRAL = 1e-6  # of the weight over the length: about the stiffness of a hanging line
+_EPSILON = float(np.finfo(float).eps)
+_TANGENT = 16.0 * _EPSILON  # of a node's largest stiffness: what its tangent is known to
 _NEAREST = 8  # eigenvalues looked at
 _KRYLOV = 80  # vectors they are found with
 
@@ -38,24 +40,29 @@ def moved(pose: Pose, move: Array) -> Pose:
 
 
 class Scales:
-    """What a line is measured by: `force` (6,), its weight (times its longest element for moments); `metric` (n, 6), the weight
-    at each node [N] (times its own length squared over twelve); `neutral` [1/m]: of the metric, stiffness that counts as none.
+    """What a line is measured by: `force`, its weight [N]; `arm` (6,), by which that is multiplied, the longest element for moments;
+    `metric` (n, 6), each node's share of the weight by its length [N] (times that length squared over twelve); `neutral` [1/m]: of the
+    metric, stiffness that counts as none; `rounding` [N]: force that a last digit of the position of the top makes in the stiffest element.
+
+    A line that has hardly any weight is measured by the force that bends it, EI / L^2.
     """
 
     def __init__(self, line: Line) -> None:
-        weight = np.abs(line.weight * line.length)
-        longest = float(line.length.max())
-        self.force = float(weight.sum()) * np.array([1.0, 1.0, 1.0, longest, longest, longest])
-        node, length = (0.5 * (np.append(a, 0.0) + np.append(0.0, a)) for a in (weight, line.length))
-        self.metric = np.column_stack([node] * 3 + [node * length**2 / 12.0] * 3)
-        self.neutral = _NEUTRAL / float(line.length.sum())
+        length = float(line.length.sum())
+        self.force = max(float(np.abs(line.weight * line.length).sum()), float(line.stiffness[:, 4:].min()) / length**2)
+        self.arm = np.array([1.0] * 3 + [float(line.length.max())] * 3)
+        node = 0.5 * (np.append(line.length, 0.0) + np.append(0.0, line.length))
+        self.metric = self.force / length * np.column_stack([node] * 3 + [node**3 / 12.0] * 3)
+        self.neutral = _NEUTRAL / length
+        self.rounding = _EPSILON * length * float((line.stiffness[:, 0] / line.length).max())
 
 
 class Balance:
     """Forces on a line at a pose with its top held (the top's attitude too if it is clamped).
 
-    potential [J], known to `blur`; residual (n, 6): what is not in balance, 0 where held; pull (n, 6): minus the drag in it; size: largest
-    residual over its scale; top, foot (6,): force and moment on the pipe at its ends.
+    potential [J], known to `blur`; residual (n, 6): what is not in balance, 0 where held; pull (n, 6): minus the drag in it; top, foot
+    (6,): force and moment on the pipe at its ends; size: largest residual (moments over the longest element), at the node `worst`, over
+    the weight or the force at an end, whichever is largest; rounding: what round-off makes of it.
     """
 
     def __init__(self, line: Line, water: Water, scales: Scales, pose: Pose) -> None:
@@ -67,7 +74,10 @@ class Balance:
         self.potential, self.blur = sum(parts), _ROUND_OFF * sum(abs(part) for part in parts)
         self.top, self.foot = self.residual[-1].copy(), self.residual[0].copy()
         self.hold(self.residual)
-        self.size = float((np.abs(self.residual) / scales.force).max())
+        force = max(scales.force, *(float(np.linalg.norm(end[:3])) for end in (self.top, self.foot)))
+        left = np.abs(self.residual) / scales.arm
+        self.worst = int(left.max(axis=1).argmax())
+        self.size, self.rounding = float(left.max()) / force, scales.rounding / force
 
     def after(self, move: Array) -> "Balance":
         """The balance after the displacements and spins (n, 6)."""
@@ -95,7 +105,9 @@ class Balance:
 
     def definite(self, damping: float = 0.0) -> bool:
         """Whether the symmetric part of the tangent, with `damping` [1/m] times the metric, is positive definite."""
-        return positive(self.line, self.pose[1], self.tangent, (self.scales.neutral + damping) * self.scales.metric)
+        known = _TANGENT * np.abs(self.tangent[0]).reshape(-1, 2, 3, 6).max(axis=(2, 3))  # of forces, of moments
+        added = (self.scales.neutral + damping) * self.scales.metric + np.repeat(known, 3, axis=1)
+        return positive(self.line, self.pose[1], self.tangent, added)
 
     def _attracting(self) -> bool:
         factors = Factors(self, self.scales.neutral)

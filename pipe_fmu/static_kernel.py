@@ -73,7 +73,7 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
         stress[STRAINS] = -weight / 6.0
         z1, z2 = position[e, 2], position[e + 1, 2]
         if line.bed.shape[0] > 0:
-            energy, on_sag = press(h, line.diameter[e], line.weight[e], z1, z2, strain[STRAINS], points)
+            energy, on_sag = press(h, line.diameter[e], line.bearing[e], z1, z2, strain[STRAINS], points)
             pressed += energy
             stress[STRAINS] += on_sag
         gravity -= weight * (0.5 * (z1 + z2) + strain[STRAINS] / 6.0)

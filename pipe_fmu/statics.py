@@ -1,5 +1,6 @@
 """Static equilibrium, G_stat = 0 of eq. (94): the line is hung with a free top from the catenary, in still water and then in the current,
-and its top section is turned to where it is held, each time to a stable equilibrium near the last one.
+and its top section is turned to where it is held, each time to a stable equilibrium near the last one. The foot's is held from the start,
+or where that fails turned in the same way.
 """
 
 import math
@@ -18,7 +19,8 @@ _HAULED_FROM = 0.9  # of the taut distance
 _LONGEST = 1.0 / 8.0  # of the way that the top is led, in one step,
 _SHORTEST = 1.0 / 512.0  # and the step at which the line may fall into another shape
 _FEW = 150  # steps of descent, while the step of the top can be shortened
-_TURN_OF_TOP = 0.35  # rad of the top section in one step
+_TURN_OF_END = 0.35  # rad of the section at an end in one step
+_LEVEL = np.array([1.0, 0.0, 0.0, 0.0])  # attitude of a clamped foot
 
 
 class Equilibrium(NamedTuple):
@@ -32,8 +34,14 @@ class Equilibrium(NamedTuple):
     stiffness: Array  # (6, 6) d top / d (displacement, spin) of the top
     stable: bool  # the tangent is positive definite
     iterations: int
-    residual: float
+    residual: float  # largest force not in balance, over the weight or the force at an end, whichever is largest
+    worst: int  # the node it is at
     flaw: str  # what an element is where the forces balance in no configuration of a line
+
+    def unbalance(self, s: Array) -> str:
+        """What is not in balance, in words; s (n,): arc lengths of the nodes."""
+        largest = f"residual {self.residual:.1e} of the weight or end force at s = {s[self.worst]:.6g} m"
+        return f"{largest} after {self.iterations} corrections" + (f"; an element is {self.flaw}" if self.flaw else "")
 
 
 Led = Callable[[Equilibrium, float, float], Pose]
@@ -46,21 +54,30 @@ def solve(line: Line, s: Array, water: Water, top: tuple[float, float, float], a
     """
     scales, free = Scales(line), line._replace(top_clamped=False)
     result = _hung(free, water, scales, s, top)
+    if not result.stable and line.foot_clamped:
+        pinned = _hung(free._replace(foot_clamped=False), water, scales, s, top)
+        turned = _turned(free, water, scales, pinned, 0, _LEVEL)
+        result = turned if turned.stable or not result.converged else result
     if not result.stable:
         hauled = _hauled(free, water, scales, s, top)
         result = hauled if hauled.stable or not result.converged else result
     if attitude is None or not line.top_clamped or not result.converged:
         return result
+    return _turned(line, water, scales, result, -1, attitude)
+
+
+def _turned(line: Line, water: Water, scales: Scales, result: Equilibrium, node: int, attitude: Array) -> Equilibrium:
+    """Equilibrium with the section at one end turned to `attitude` (4,) from where it is."""
     held = tuple(float(x) for x in attitude)
-    start = tuple(float(x) for x in result.quaternion[-1])
+    start = tuple(float(x) for x in result.quaternion[node])
     turn = log(multiply(held, conjugate(start)))
 
     def turned(at: Equilibrium, reached: float, wanted: float) -> Pose:
         quaternion = at.quaternion.copy()
-        quaternion[-1] = held if wanted == 1.0 else multiply(exp(scale(wanted, turn)), start)
+        quaternion[node] = held if wanted == 1.0 else multiply(exp(scale(wanted, turn)), start)
         return at.position, quaternion
 
-    return _led(line, water, scales, result, turned, min(1.0, _TURN_OF_TOP / max(math.hypot(*turn), _TURN_OF_TOP)))
+    return _led(line, water, scales, result, turned, min(1.0, _TURN_OF_END / max(math.hypot(*turn), _TURN_OF_END)))
 
 
 def _hung(line: Line, water: Water, scales: Scales, s: Array, top: tuple[float, float, float]) -> Equilibrium:
@@ -110,12 +127,13 @@ def equilibrium(line: Line, water: Water, scales: Scales, pose: Pose, descents: 
     factors = Factors(balance, 0.0)
     stiffness = factors.stiffness() if factors.regular else np.full((6, 6), math.nan)
     at_ends = balance.top, balance.foot, stiffness
-    return Equilibrium(converged, *balance.pose, *at_ends, stable, iterations, balance.size, balance.flaw())
+    return Equilibrium(converged, *balance.pose, *at_ends, stable, iterations, balance.size, balance.worst, balance.flaw())
 
 
 def _catenary(line: Line, s: Array, top: tuple[float, float, float]) -> Pose:
     """Pose in which the search starts."""
-    position, quaternion = catenary.shape(s, float(s[-1]), top, line.bed.shape[0] > 0)
+    floats = float(line.weight @ line.length) < 0.0
+    position, quaternion = catenary.shape(s, float(s[-1]), top, line.bed.shape[0] > 0, floats)
     if line.foot_clamped:
-        quaternion[0] = (1.0, 0.0, 0.0, 0.0)
+        quaternion[0] = _LEVEL
     return position, quaternion

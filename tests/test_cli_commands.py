@@ -172,7 +172,7 @@ def test_results_replace_those_of_an_earlier_run_and_nothing_else(still, tmp_pat
         (["run", "-o", "/proc/pipelay"], "--output = '/proc/pipelay': cannot be written"),
         (["export", "-o", "/proc/pipelay"], "--output = '/proc/pipelay': cannot be written"),
         (["statics", "paper", "--set", "pipe"], "--set pipe"),
-        (["statics", "paper", "--set", "pipe.top_range=100"], "pipe.top_range = 100: must be"),
+        (["statics", "paper", "--set", "pipe.top_range=200"], "pipe.top_range = 200: must be"),
         (["statics", "paper", "--set", f"pipe.length=1{'0' * 400}"], "must be finite"),
         (["statics", "paper", "--set", "vessel.added_mass.sway_yaw=1e9"], "vessel.added_mass.sway_yaw = 1e+09: must"),
         (["statics", "paper", "--set", "vessel.damping.heave_pitch=1e12"], "vessel.damping.heave_pitch = 1e+12: must"),

@@ -271,13 +271,16 @@ def test_a_limited_move_turns_no_section_by_more_and_keeps_its_direction():
 
 
 def test_a_line_is_measured_by_its_weight():
-    """Forces by all of it, moments by that times the longest element; a node by its share W, turning by W l^2 / 12."""
+    """Forces by all of it, moments by the longest element times that; a node of length l by its share W, turning by W l^2 / 12."""
     _, line = bar(9.0, 3, axial=1e5, shear=1e5, torsion=80.0, bending=100.0)
-    scales = Scales(line._replace(weight=np.array([2.0, -4.0]), length=np.array([3.0, 6.0])))
-    np.testing.assert_allclose(scales.force, [30.0] * 3 + [180.0] * 3)
-    share, own = np.array([3.0, 15.0, 12.0]), np.array([1.5, 4.5, 3.0])
-    np.testing.assert_allclose(scales.metric[:, 0], share)
-    np.testing.assert_allclose(scales.metric[:, 4], share * own**2 / 12.0)
+    line = line._replace(weight=np.array([2.0, -4.0]), length=np.array([3.0, 6.0]))
+    own = np.array([1.5, 4.5, 3.0])
+    for weight, load in ((1.0, 30.0 / 9.0), (0.0, 100.0 / 9.0**3)):  # a line without weight by what buckles it, EI / L^2
+        scales = Scales(line._replace(weight=weight * line.weight))
+        assert scales.force == pytest.approx(9.0 * load)
+        np.testing.assert_allclose(scales.arm, [1.0] * 3 + [6.0] * 3)
+        np.testing.assert_allclose(scales.metric[:, 0], load * own)
+        np.testing.assert_allclose(scales.metric[:, 4], load * own**3 / 12.0)
 
 
 def test_attitudes_stay_of_unit_length():
