@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from pipe_helpers import HANGING, P16, balance, march
-from random_lines import draw, judge
+from random_lines import draw, settled
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
@@ -220,4 +220,4 @@ def test_statics_that_find_nothing_name_the_residual_what_it_is_measured_by_and_
 @pytest.mark.parametrize("number", [number for number in range(63) if number not in SLOW])
 def test_a_random_line_is_found_stable_not_inverted_and_right(number):
     """Sixty lines, against a mesh four times finer."""
-    assert judge(draw(number)).faults == []
+    assert settled(draw(number)).faults == []
