@@ -152,7 +152,7 @@ def judge(drawn: Drawn, nodes: int = 48) -> Judged:
 
 
 def settled(drawn: Drawn) -> Judged:
-    """The verdict on 48 nodes, or on four times as many where 48 do not resolve how the line bends (hoses: in a thousandth of their length)."""
+    """The verdict on 48 nodes, or on four times as many where 48 do not resolve how the line bends, as a hose within a metre."""
     judged = judge(drawn)
     unresolved = judged.found and judged.errors[0] <= FORCE and not judged.errors[1] <= MOMENT
     return replace(judge(drawn, FINER * 47 + 1), unresolved=True) if unresolved else judged
