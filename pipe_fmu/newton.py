@@ -7,9 +7,10 @@ import numpy as np
 from .block_tridiagonal import SIZE, condense, factorize, substitute
 from .columns import line_columns, take
 from .compiled import inner, kernel
-from .ends import condense_top, hold_foot, hold_foot_residual, top_correction, yielding
+from .ends import axis_of_foot, condense_top, hold_foot, hold_foot_residual, top_correction, yielding
 from .lanes import larger
 from .node_kernel import advance
+from .so3 import dot
 from .state import PipeState
 from .step_kernel import assemble, old_columns
 
@@ -42,12 +43,15 @@ def _size(residual, force_scale, moment_scale, top_clamped):
 
 
 @inner
-def _inertial(line, h, old, x):
-    """Largest terms of inertia at any node: force 2 m (|x| / h + |v|) / h [N] and the moment like it [N m]."""
+def _inertial(line, h, old, x, top):
+    """Largest terms of inertia at any node, the top's increment `top` (6,) given: force 2 m v / h [N] and the moment like it [N m]."""
     velocity, rate = old[2], old[3]
     force, moment = 0.0, 0.0
+    told, turned = 0.0, 0.0
+    for k in range(3):
+        told, turned = max(told, math.fabs(top[k]) / h), max(turned, math.fabs(top[3 + k]) / h)
     for i in range(x.shape[0]):
-        speed, spin, mass, inertia = 0.0, 0.0, line.mass[i], 0.0
+        speed, spin, mass, inertia = told, turned, line.mass[i], 0.0
         for k in range(3):
             speed = max(speed, math.fabs(x[i, k]) / h, math.fabs(velocity[k, i]))
             spin = max(spin, math.fabs(x[i, 3 + k]) / h, math.fabs(rate[k, i]))
@@ -110,6 +114,8 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful
             x[i, k] = h * guess
     for k in range(SIZE if line.foot_clamped else 3):
         x[0, k] = 0.0  # held, and no correction would take back what the guess makes of round-off
+    if not line.foot_clamped:
+        _stop_twist(state.quaternion, x[0])
     force, tangent = np.empty(SIZE), np.zeros((SIZE, SIZE))
     system = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n, SIZE))
     scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE), np.empty((n, SIZE))
@@ -167,7 +173,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
     least, lowest_settled, patience, last = math.inf, math.inf, PATIENCE, False
-    inertial_force, inertial_moment = _inertial(ours, h, old, x)
+    inertial_force, inertial_moment = _inertial(ours, h, old, x, top)
     round_off = _elastic_round_off(line, h)
     fresh = keep = n > 0  # True, but no literal, for which numba would compile the assembly once more
     prescribed = True
@@ -184,12 +190,13 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             if prescribed and (line.top_clamped or i < 3):
                 gap = max(gap, math.fabs(wanted[i]))
         hold_foot_residual(line, quaternion, (x[0, 3], x[0, 4], x[0, 5]), residual)
+        floor = ROUND_OFF * force_scale + round_off
         force_scale, moment_scale = force_scale + INERTIAL * inertial_force, moment_scale + INERTIAL * inertial_moment
         size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
         if last:
             return True, iteration, size
         lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
-        stalled = max(size, previous) <= ROUND_OFF + round_off / force_scale and size > 0.3 * previous and share == 1.0
+        stalled = max(size, previous) <= TOLERANCE + floor / force_scale and size > 0.3 * previous and share == 1.0
         settled = not lost and gap == 0.0 and (size <= TOLERANCE or stalled)
         made = _made(line, old[0][2], x, residual, force, works) if settled else math.inf
         done = made <= 1.0
@@ -230,11 +237,22 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             break
         substitute(diagonal, upper, residual, move, correction)
         _move(x, 1.0, correction)
+        if not line.foot_clamped:
+            _stop_twist(quaternion, x[0])
         for i in range(SIZE):
             if prescribed and (line.top_clamped or i < 3):
                 x[n - 1, i] = top[i]
         previous = size
     return False, limit, size
+
+
+@inner
+def _stop_twist(quaternion, move):
+    """Take from the rotation in `move` (6,) of the foot what turns it about its own axis."""
+    axis = axis_of_foot(quaternion)
+    along = dot((move[3], move[4], move[5]), axis)
+    for i in range(3):
+        move[3 + i] -= along * axis[i]
 
 
 @inner
