@@ -177,6 +177,7 @@ def cases() -> tuple[Case, ...]:
         Case("3000 m of water", replace(hanging, length=3900.0, top_position=(2000.0, 0.0, -3000.0), environment=deep), heave),
         Case("current reversed every 5 s", replace(hanging, environment=reversing), heave),
         Case("top moved 50 m in a second", hanging, shift((-30.0, 40.0, 0.0), 1.0), 20.0),
+        Case("top moved 100 m in a second", hanging, shift((-60.0, 80.0, 0.0), 1.0), 20.0),
         Case("0.1 m beside 100 m", replace(hanging, nodes=len(uneven), nodes_at=uneven), heave),
         Case("an hour without drag", replace(hanging, section=no_drag, nodes=12), swing(2.0, 12.0, until=36.0), 3600.0, (0.5, 1.0, 2.0)),
         Case("lying line lifted", lying, shift((-10.0, 0.0, -40.0), 40.0)),

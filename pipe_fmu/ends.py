@@ -9,7 +9,7 @@ from .so3 import dot, matrix
 
 
 @inner
-def _axis(quaternion):
+def axis_of_foot(quaternion):
     """Direction t1 of the foot."""
     rm = matrix((quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3]))
     return (rm[0][0], rm[1][0], rm[2][0])
@@ -25,7 +25,10 @@ def hold_foot(line, quaternion, diagonal, upper):
             coupling[i, j] = 0.0
     if line.foot_clamped:
         return
-    axis = _axis(quaternion)
+    for i in range(3):
+        for j in range(3):
+            block[3 + i, j] = 0.0  # times no displacement; beside them a held row is no pivot, and moves by round-off
+    axis = axis_of_foot(quaternion)
     stiffness = line.stiffness[0, 3] / line.length[0]
     for j in range(SIZE):
         along = block[3, j] * axis[0] + block[4, j] * axis[1] + block[5, j] * axis[2]
@@ -44,7 +47,7 @@ def hold_foot_residual(line, quaternion, theta, residual):
         residual[0, i] = 0.0
     if line.foot_clamped:
         return
-    axis = _axis(quaternion)
+    axis = axis_of_foot(quaternion)
     stiffness = line.stiffness[0, 3] / line.length[0]
     along = dot((residual[0, 3], residual[0, 4], residual[0, 5]), axis)
     turned = dot(theta, axis)

@@ -208,7 +208,9 @@ def add_mean_contact(h, dt, diameter, weight, bed, old, new, ends, mean_row, new
         row[8] += x
         row_new[2] += y
         row_new[8] += x
-        rate = (z_new - z_old) / dt
+        rate = 0.0  # of the points' depth; from the velocities, as a difference of depths over a very short step is round-off
+        for i in range(6):
+            rate += row[i] * ends[0, i] + row[6 + i] * ends[1, i]
         hardening = max(0.0, 1.0 + bed[0] * rate)  # the bed pushes, it never holds a pipe that leaves it
         total = force * hardening
         dissipated += share * (total - force) * rate * dt

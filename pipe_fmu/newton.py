@@ -7,20 +7,26 @@ import numpy as np
 from .block_tridiagonal import SIZE, condense, factorize, substitute
 from .columns import line_columns, take
 from .compiled import inner, kernel
-from .ends import condense_top, hold_foot, hold_foot_residual, top_correction, yielding
+from .ends import axis_of_foot, condense_top, hold_foot, hold_foot_residual, top_correction, yielding
 from .lanes import larger
 from .node_kernel import advance
+from .so3 import dot
 from .state import PipeState
 from .step_kernel import assemble, old_columns
 
 TOLERANCE = 1e-11  # of the largest element force (moment): well below any coupling tolerance
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
+EXCHANGED, STORED = 2e-11, 2e-15  # of the energies exchanged and stored in a step: work that its residual may do
+PATIENCE = 8  # corrections of a settled residual that do not lower it, after which its work is taken for round-off
+INERTIAL = 1e-4  # of the terms of inertia, which the residual is measured by too: their round-off over TOLERANCE
+STRETCH = 1e-14  # of the stiffness: round-off of the section forces, which the residual does not fall below
 NEAR = 1e-5  # residual from which on a tangent is kept
 MAX_CORRECTIONS = 25
 CAREFUL_CORRECTIONS = 100
 SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
 SHARP = 1e-3  # residual below which a careful search takes Newton's tangent of friction
 LEAST_SHARE = 0.02  # of a correction: a careful search halves no further
+_NOTHING = 1e-300  # J
 LOST = 1e12  # residual, and element force over the axial stiffness, from which there is no way back
 
 
@@ -34,6 +40,59 @@ def _size(residual, force_scale, moment_scale, top_clamped):
         for j in range(held if i == n - 1 else 0, SIZE):
             worst = larger(worst, math.fabs(residual[i, j]) / (force_scale if j < 3 else moment_scale))
     return worst
+
+
+@inner
+def _inertial(line, h, old, x, top):
+    """Largest terms of inertia at any node, the top's increment `top` (6,) given: force 2 m v / h [N] and the moment like it [N m]."""
+    velocity, rate = old[2], old[3]
+    force, moment = 0.0, 0.0
+    told, turned = 0.0, 0.0
+    for k in range(3):
+        told, turned = max(told, math.fabs(top[k]) / h), max(turned, math.fabs(top[3 + k]) / h)
+    for i in range(x.shape[0]):
+        speed, spin, mass, inertia = told, turned, line.mass[i], 0.0
+        for k in range(3):
+            speed = max(speed, math.fabs(x[i, k]) / h, math.fabs(velocity[k, i]))
+            spin = max(spin, math.fabs(x[i, 3 + k]) / h, math.fabs(rate[k, i]))
+            inertia = max(inertia, line.inertia[k, i])
+            if line.added_mass.shape[1] > 0:
+                mass = max(mass, line.added_mass[k, i])
+        arm = math.fabs(line.offset[i])
+        push = 2.0 * mass / h * (speed + arm * spin)
+        force = max(force, push)
+        moment = max(moment, arm * push + 2.0 * inertia / h * spin)
+    return force, moment
+
+
+@inner
+def _elastic_round_off(line, h):
+    """Round-off of the section forces [N], those of internal damping included."""
+    worst = 0.0
+    for e in range(line.length.shape[0]):
+        lag = line.damping[e] if line.damping.shape[0] > 0 else 0.0
+        worst = max(worst, STRETCH * line.stiffness[e, 0] * (1.0 + lag / h))
+    return worst
+
+
+@inner
+def _made(line, z, x, residual, force, works):
+    """Work of the free residual, which is the energy that the step makes, over what it may be; at depths z (n,) before the step."""
+    n, held = x.shape[0], SIZE if line.top_clamped else 3
+    made, top, fall, stored = 0.0, 0.0, 0.0, 0.0
+    for i in range(n):
+        for j in range(held if i == n - 1 else 0, SIZE):
+            made += residual[i, j] * x[i, j]
+    for j in range(held):
+        top += force[j] * x[n - 1, j]
+    for e in range(n - 1):
+        weight = 0.5 * line.length[e] * line.weight[e]
+        fall += weight * (x[e, 2] + x[e + 1, 2])
+        stored += math.fabs(weight * (z[e] + z[e + 1]))
+    exchanged = math.fabs(top) + math.fabs(fall)
+    for k in range(SIZE):
+        exchanged += math.fabs(works[k])
+    return math.fabs(made) / (EXCHANGED * exchanged + STORED * stored + _NOTHING)
 
 
 @kernel
@@ -55,9 +114,11 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful
             x[i, k] = h * guess
     for k in range(SIZE if line.foot_clamped else 3):
         x[0, k] = 0.0  # held, and no correction would take back what the guess makes of round-off
+    if not line.foot_clamped:
+        _stop_twist(state.quaternion, x[0])
     force, tangent = np.empty(SIZE), np.zeros((SIZE, SIZE))
     system = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n, SIZE))
-    scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
+    scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE), np.empty((n, SIZE))
     ends = state.quaternion, h * mobility, top, force, tangent
     converged, iterations, size = _search(line, ours, water, h, old, new, x, careful, works, ends, system, scratch)
     for i in range(3 if not line.top_clamped else 0):
@@ -103,20 +164,23 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
     overshoots, and halves a correction that does not lower the residual. Fills the force on the pipe's top (6,), the tangent (6, 6) as the
     top feels it and the works (6,). Returns (converged, corrections, residual).
 
-    ends: quaternions (n, 4), mobility, top, force, tangent; system: as in step_kernel.assemble; scratch: (n, 6), (6,), (6,).
+    ends: quaternions (n, 4), mobility, top, force, tangent; system: as in step_kernel.assemble; scratch: (n, 6), (6,), (6,), (n, 6).
     """
     quaternion, mobility, top, force, tangent = ends
-    correction, wanted, move = scratch
+    correction, wanted, move, best = scratch
     n, limit = x.shape[0], CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
     diagonal, lower, upper, residual = system
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
+    least, lowest_settled, patience, last = math.inf, math.inf, PATIENCE, False
+    inertial_force, inertial_moment = _inertial(ours, h, old, x, top)
+    round_off = _elastic_round_off(line, h)
     fresh = keep = n > 0  # True, but no literal, for which numba would compile the assembly once more
     prescribed = True
     for i in range(SIZE):
         for j in range(SIZE):
             prescribed = prescribed and mobility[i, j] == 0.0
-    for iteration in range(limit + 1):
+    for iteration in range(limit + 2):
         sharp = not careful or size < SHARP
         force_scale, moment_scale = assemble(ours, water, h, old, new, x, fresh, sharp, system, works)
         gap = 0.0
@@ -126,13 +190,27 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             if prescribed and (line.top_clamped or i < 3):
                 gap = max(gap, math.fabs(wanted[i]))
         hold_foot_residual(line, quaternion, (x[0, 3], x[0, 4], x[0, 5]), residual)
+        floor = ROUND_OFF * force_scale + round_off
+        force_scale, moment_scale = force_scale + INERTIAL * inertial_force, moment_scale + INERTIAL * inertial_moment
         size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
+        if last:
+            return True, iteration, size
         lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
-        stalled = max(size, previous) <= ROUND_OFF and size > 0.3 * previous and share == 1.0
-        done = not lost and gap == 0.0 and (size <= TOLERANCE or stalled)
+        stalled = max(size, previous) <= TOLERANCE + floor / force_scale and size > 0.3 * previous and share == 1.0
+        settled = not lost and gap == 0.0 and (size <= TOLERANCE or stalled)
+        made = _made(line, old[0][2], x, residual, force, works) if settled else math.inf
+        done = made <= 1.0
         if done and iteration > 0:
             return True, iteration, size
-        if careful and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
+        if made < least:
+            least, best[:] = made, x
+        if settled:
+            patience -= 1 if size > 0.9 * lowest_settled else 0
+            lowest_settled = min(size, lowest_settled)
+        if least < math.inf and (patience == 0 or lost or iteration == limit):
+            x[:], fresh, last = best, n == 0, True
+            continue
+        if careful and not settled and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
             share *= 0.5
             _move(x, -share, correction)
             continue
@@ -159,11 +237,22 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             break
         substitute(diagonal, upper, residual, move, correction)
         _move(x, 1.0, correction)
+        if not line.foot_clamped:
+            _stop_twist(quaternion, x[0])
         for i in range(SIZE):
             if prescribed and (line.top_clamped or i < 3):
                 x[n - 1, i] = top[i]
         previous = size
     return False, limit, size
+
+
+@inner
+def _stop_twist(quaternion, move):
+    """Take from the rotation in `move` (6,) of the foot what turns it about its own axis."""
+    axis = axis_of_foot(quaternion)
+    along = dot((move[3], move[4], move[5]), axis)
+    for i in range(3):
+        move[3 + i] -= along * axis[i]
 
 
 @inner

@@ -88,6 +88,27 @@ def test_energy_identity_at_five_seconds_where_newton_converges(name):
     assert converged > 4
 
 
+@pytest.mark.parametrize("moving", [False, True], ids=["from-rest", "moving"])
+@pytest.mark.parametrize("name", SCENES)
+def test_a_step_of_any_length_down_to_a_tenth_of_a_picosecond_changes_the_state_in_proportion(name, moving):
+    """Whatever is left of a host's last step: the line moves by its mean velocity, to the round-off of positions, and no energy is made."""
+    pipe, _, state = started(scene(name))
+    if moving:
+        states, _ = march(pipe, state, sway, 0.05, 40)
+        state = states[-1]
+    velocity = np.array([0.4, 0.2, -0.9]) + (state.velocity[-1] if moving else 0.0)
+    for late in (0.0, 1e6):
+        for h in 10.0 ** -np.arange(2.0, 14.0):
+            old = state._replace(time=late) if late else state
+            result = pipe.step(old, velocity, np.zeros(3), h)
+            assert result.converged, h
+            moved = np.abs(result.state.position - old.position).max()
+            assert moved <= 3.0 * h * max(np.abs(velocity).max(), np.abs(old.velocity).max()) + 3e-13
+            np.testing.assert_allclose(result.state.position[-1] - old.position[-1], h * velocity, rtol=0.0, atol=3e-13)
+            created, allowed = balance(pipe, old, result.state)
+            assert abs(created) <= allowed, h
+
+
 def test_each_dissipation_is_there_when_named_and_only_then():
     present = {
         "bed": "contact",

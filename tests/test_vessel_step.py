@@ -43,7 +43,7 @@ def energy(vessel, state):
 
 
 @pytest.mark.parametrize("rate", [0.01, 0.1, 0.5])
-@pytest.mark.parametrize("h", [1e-3, 0.02, 0.1, 0.5, 1.0, 2.0, 5.0])
+@pytest.mark.parametrize("h", [1e-13, 1e-10, 1e-6, 1e-3, 0.02, 0.1, 0.5, 1.0, 2.0, 5.0])
 def test_energy_balance_is_exact_for_any_step(h, rate):
     """Energy change = works - dissipations to 1e-13 of the works (plus the round-off of the energies themselves).
 
