@@ -14,8 +14,9 @@ Strains (the order of the rows of `stiffness` and of the gradients):
     6  c_z = e3 . (d x R_m psi) / 2                         sag of the arc below the chord (loads, not strain)
 
 Where the chord stands at an angle a to t_1 of the mid frame, s is |u| / h times the sine of a and f = 2 |u| / (|u| + u_1), which is
-1 / cos^2(a / 2), so that g is |u| / h times 2 tan(a / 2). The two are the same to third order, but the sine falls beyond a right angle and
-vanishes at a = pi, where the element is turned inside out; g grows with a and without bound, as <d_S phi, R e1> > 0 of eq. (1) demands.
+1 / cos^2(a / 2), so that g is |u| / h times 2 tan(a / 2). They differ by a^3 / 4 to lowest order, but the sine falls beyond a right angle
+and vanishes at a = pi, where the element is quite inside out; g grows with a, without bound at pi. Eq. (1), <d_S phi, R e1> > 0, is
+broken from a right angle on, which `static_kernel.inverted` refuses.
 The extension by bending takes f s^2 (that is 4 sin^2(a / 2)): it grows with a too, so that tension as well turns an element right side
 out, and is bounded, so that no element can pay for its turning by shortening to a point. Twist and bending, corrected by little, take s.
 

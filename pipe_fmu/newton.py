@@ -7,6 +7,7 @@ import numpy as np
 from .block_tridiagonal import SIZE, condense, factorize, substitute
 from .columns import line_columns, take
 from .compiled import inner, kernel
+from .element import STRAINS
 from .ends import axis_of_foot, condense_top, hold_foot, hold_foot_residual, top_correction, yielding
 from .lanes import larger
 from .node_kernel import advance
@@ -14,7 +15,7 @@ from .so3 import dot
 from .state import PipeState
 from .step_kernel import assemble, old_columns
 
-TOLERANCE = 1e-11  # of the largest element force (moment): well below any coupling tolerance
+TOLERANCE = 1e-11  # of the largest element force (moment), inertia included as below: well below any coupling tolerance
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
 EXCHANGED, STORED = 2e-11, 2e-15  # of the energies exchanged and stored in a step: work that its residual may do
 PATIENCE = 8  # corrections of a settled residual that do not lower it, after which its work is taken for round-off
@@ -76,9 +77,11 @@ def _elastic_round_off(line, h):
 
 
 @inner
-def _made(line, z, x, residual, force, works):
-    """Work of the free residual, which is the energy that the step makes, over what it may be; at depths z (n,) before the step."""
-    n, held = x.shape[0], SIZE if line.top_clamped else 3
+def _made(line, old, x, residual, force, works):
+    """Work of the free residual, which is the energy that the step makes, over EXCHANGED of the works and the fall of the weight and STORED
+    of the gravity and elastic energy before the step; line and `old` state in columns.
+    """
+    n, held, z, strain = x.shape[0], SIZE if line.top_clamped else 3, old[0][2], old[5]
     made, top, fall, stored = 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         for j in range(held if i == n - 1 else 0, SIZE):
@@ -89,8 +92,10 @@ def _made(line, z, x, residual, force, works):
         weight = 0.5 * line.length[e] * line.weight[e]
         fall += weight * (x[e, 2] + x[e + 1, 2])
         stored += math.fabs(weight * (z[e] + z[e + 1]))
+        for k in range(STRAINS):
+            stored += 0.5 * line.length[e] * line.stiffness[k, e] * strain[k, e] * strain[k, e]
     exchanged = math.fabs(top) + math.fabs(fall)
-    for k in range(SIZE):
+    for k in range(works.shape[0]):
         exchanged += math.fabs(works[k])
     return math.fabs(made) / (EXCHANGED * exchanged + STORED * stored + _NOTHING)
 
@@ -198,7 +203,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
         lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
         stalled = max(size, previous) <= TOLERANCE + floor / force_scale and size > 0.3 * previous and share == 1.0
         settled = not lost and gap == 0.0 and (size <= TOLERANCE or stalled)
-        made = _made(line, old[0][2], x, residual, force, works) if settled else math.inf
+        made = _made(ours, old, x, residual, force, works) if settled else math.inf
         done = made <= 1.0
         if done and iteration > 0:
             return True, iteration, size

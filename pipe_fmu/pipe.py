@@ -23,6 +23,7 @@ class Pipe:
         self.water = model.waters(self.parameters)
         self.mass = model.mass_per_length(self.parameters, self.s)
         self.walls = wall_stress.walls(parameters, self.s)
+        self.element_walls = wall_stress.element_walls(parameters, self.s)
 
     def equilibrium(self, top: tuple[float, float, float], attitude: Array | None, time: float = 0.0) -> Equilibrium:
         """Static equilibrium with the top at `top` (3,) [m], e, its section at `attitude` (4,), or as it hangs if None."""
@@ -65,7 +66,7 @@ class Pipe:
 
     def largest_von_mises(self, state: PipeState, forces: SectionForces) -> float:
         """Largest von Mises stress [Pa] along the line, between the nodes too."""
-        return wall_stress.largest_von_mises(self.walls[1], self.s, state.position, forces)
+        return wall_stress.largest_von_mises(self.element_walls, self.s, state.position, forces)
 
     def wall_tension(self, state: PipeState, forces: SectionForces) -> Array:
         """Force (n,) [N] in the wall at every node, at a joint in that of the section below."""

@@ -30,7 +30,7 @@ _TURN = 0.25  # rad of one correction
 _INNER = 6  # corrections of one step of a descent
 _SHARE = 0.1  # of the promised energy that a step must release
 _LEAST_DAMPING = 1e-7  # 1/m
-_MOST_DAMPING = 1e9
+_MOST_DAMPING = 1e15
 _POWERS = 6  # inverse iterations for a direction of negative curvature
 
 

@@ -1,8 +1,8 @@
 """Section forces at the nodes of a line at rest or in motion, recovered from equilibrium of the elements' ends.
 
 A two-node element knows its section force only in the mean. What it hands to its node, less its own share of the distributed loads, is
-the section force at the node to the accuracy of the reactions; the elements left and right of a node are averaged. Three things make
-that fourth-order accurate in motion as at rest:
+the section force at the node to the accuracy of the reactions; the elements left and right of a node are averaged. Three things
+make moments fourth-order accurate in motion as at rest, and forces, in motion, second-order, as inertia along the line is lumped:
 
 - The loads are all those that act at the instant. Weight, drag and the bed's elastic reaction are taken element by element. What then is
   not in balance at a node are the inertial forces of its mass and added mass (and damping and friction of the bed): they give the node's
@@ -11,10 +11,11 @@ that fourth-order accurate in motion as at rest:
 - The element bends as a cubic. Between nodes that are far apart against the bending length sqrt(EI / T), a bar under tension T does not:
   with z = T h^2 / (4 EI) its end moments differ from the mean law EI kappa by the factors F = 3 (sqrt z coth sqrt z - 1) / z (both ends
   bent alike) and 15 (1 / F - 1) / z (bent to an S) of what the cubic says (exact bar under tension and linear load). Both are 1 for a short
-  element, and with EI the moment goes to zero.
+  element, and with EI the moment goes to zero. An element that is pushed keeps the cubic.
 
 Tension is the effective tension; the wall's own: wall_stress.py. Viscous stresses of internal damping are those of the rates of strain at
-the instant; numerical damping acts on the means over a step only, and is left out.
+the instant; numerical damping acts on the means over a step only, and is left out. So are the couples of rotary inertia (27) and rotational
+damping (32), which cancel in the mean of left and right at all nodes but the ends.
 """
 
 import math

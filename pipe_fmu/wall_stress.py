@@ -14,7 +14,7 @@ _AT_JOINT = 1e-9  # m; so near to the end of a section a node stands at its join
 
 
 class Wall(NamedTuple):
-    """Tube wall on one side of the nodes and pressures on it; (n,) each. `area` is 0 where a section has no wall."""
+    """Tube wall at n places along the line, and pressures on it; (n,) each. `area` is 0 where a section has no wall."""
 
     area: Array  # m2
     second_moment: Array  # m4
@@ -29,6 +29,11 @@ class Wall(NamedTuple):
 def walls(parameters: PipeParameters, s: Array) -> tuple[Wall, Wall]:
     """Walls below and above the nodes `s` (n,): two at a joint of sections, elsewhere the same."""
     return _wall(parameters, s - _AT_JOINT), _wall(parameters, s + _AT_JOINT)
+
+
+def element_walls(parameters: PipeParameters, s: Array) -> Wall:
+    """Walls of the elements between the nodes `s` (n,), (n - 1,) each: those of the section that their middle lies in."""
+    return _wall(parameters, 0.5 * (s[1:] + s[:-1]))
 
 
 def _wall(parameters: PipeParameters, s: Array) -> Wall:
@@ -88,7 +93,7 @@ def _wall_tension(wall, position, tension, out):
 
 
 def largest_von_mises(wall: Wall, s: Array, position: Array, forces: SectionForces) -> float:
-    """Largest von Mises stress [Pa] along the line, between the nodes `s` (n,) too; `wall` that above every node, which is its element's.
+    """Largest von Mises stress [Pa] along the line, between the nodes `s` (n,) too; `wall` that of the elements.
 
     Between nodes the bending moment is that of section_forces.bending_square; tension, torque and depth are linear.
     """

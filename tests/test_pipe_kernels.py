@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from pipe_helpers import P16, assembled, bar, rotation, started, straight
 from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
 
-from pipe_fmu import PipeParameters, block_tridiagonal, ends, newton, section_forces, stability, wall_stress
+from pipe_fmu import PipeParameters, block_tridiagonal, ends, newton, section_forces, stability, step_kernel, wall_stress
 from pipe_fmu.environment import Environment
 from pipe_fmu.line import Water
 
@@ -62,6 +63,25 @@ def test_recovery_takes_off_the_drag_of_the_velocities_at_the_ends():
     ends = np.array([[0.15, 0.35], [0.35 + 0.3, 0.15 + 0.7]]) * carried
     by_hand = [-ends[0, 0], 0.5 * (ends[0, 1] - share / 12.0 - ends[1, 0]), share / 4.0 + ends[1, 1]]
     np.testing.assert_allclose(found[:, 1], by_hand, rtol=1e-12)
+
+
+@pytest.mark.parametrize("tension", [3e4, -1e3])
+def test_a_line_bent_about_its_other_axis_has_the_same_moments_there(tension):
+    """EI_2 and EI_3 exchanged and the whole turned about x by a right angle: m_2 becomes m_3, and n_2 becomes n_3."""
+    mass, still, nothing = section_forces.MassPerLength(*np.ones((2, 3))), Water(np.zeros(0), np.zeros((0, 3)), False), np.zeros((4, 3))
+    angle, found = np.array([0.0, 0.15, 0.2, -0.1]), []
+    directions = np.column_stack([np.cos(angle[1:]), np.full(3, 0.02), -np.sin(angle[1:])])
+    for turn, (two, three) in ((Rotation.identity(), (2e5, 7e5)), (Rotation.from_euler("x", 90.0, degrees=True), (7e5, 2e5))):
+        s, line = bar(20.0, 4, axial=1e7, shear=4e6, torsion=3e5, bending=two, bending_3=three)
+        chords = (1.0 + tension / 1e7) * np.diff(s)[:, None] * directions
+        position = turn.apply(np.vstack([np.zeros(3), np.cumsum(chords, axis=0)]))
+        attitude = (turn * Rotation.from_euler("yz", np.column_stack([angle, 0.1 * angle])) * turn.inv()).as_quat(scalar_first=True)
+        strain = np.empty((3, 7))
+        step_kernel.element_strains(line, position, attitude, strain)
+        found.append(section_forces.nodal_wrenches(line, mass, still, position, attitude, nothing, nothing, strain))
+    (n1, n2, n3, m1, m2, m3), turned = found[0].T, found[1].T
+    assert np.abs([m2, m3]).max(axis=1).min() > 100.0
+    np.testing.assert_allclose(turned, [n1, -n3, n2, m1, -m3, m2], rtol=1e-9, atol=1e-9 * np.abs(found[0]).max())
 
 
 def test_above_the_surface_there_is_no_pressure():

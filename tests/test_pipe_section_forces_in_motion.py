@@ -67,13 +67,13 @@ def test_bending_moments_of_a_line_moving_on_its_bed():
 
 
 @pytest.mark.parametrize("case", ["heave", "violent", "added mass"])
-def test_section_forces_in_motion_are_of_fourth_order(case):
+def test_bending_moments_in_motion_are_beyond_second_order(case):
     """From 49 to 97 nodes, where the wave that the line carries is just resolved: 2.8 at least; what leaves inertia out has 2."""
     assert errors(case, 49)[0] > 2.0**2.8 * errors(case, 97)[0]
 
 
 def test_the_top_that_moves_has_the_pull_of_the_step_at_its_ends():
-    """End forces follow the mean pulls of the steps before and after, whose time they lie between, to 1e-3 of the swing."""
+    """End forces follow the mean pulls of the steps before and after, whose time they lie between, to 2e-3 of the swing."""
     pipe, _, start = started(heave_case(top="clamped", top_quaternion=(math.cos(0.588), 0.0, math.sin(0.588), 0.0)))
 
     def motion(t):
@@ -86,7 +86,7 @@ def test_the_top_that_moves_has_the_pull_of_the_step_at_its_ends():
         for k in range(80, 278, 7):
             forces, r = pipe.section_forces(states[k]), rotation(states[k].quaternion[-1])
             end = np.append(r @ np.append(forces.tension[-1], forces.shear[-1]), r @ forces.moment[-1])[part]
-            assert np.linalg.norm(end - 0.5 * (top[k - 1] + top[k])[part]) < 0.01 * swing
+            assert np.linalg.norm(end - 0.5 * (top[k - 1] + top[k])[part]) < 0.002 * swing
 
 
 @pytest.mark.parametrize("mesh", ["adapted", "uniform"])
