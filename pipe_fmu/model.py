@@ -119,12 +119,13 @@ def _line(parameters: PipeParameters, s: Array) -> Line:
     stiffness = section(lambda one: one.stiffness)
     k2, p2 = shear_stiffness(stiffness[:, 1], stiffness[:, 4], h)
     k3, p3 = shear_stiffness(stiffness[:, 1], stiffness[:, 3], h)
-    mass = section(lambda one: one.mass_per_length)
+    carried = mass_per_length(parameters, s)
+    mass = carried.along
     displaced = section(lambda one: density * one.outer_area)
     diameter = section(lambda one: one.hydrodynamic_diameter)
     added = np.zeros((0, 3))
     if parameters.added_mass is not None:
-        across = parameters.added_mass.coefficient * displaced
+        across = carried.across - mass
         added = _lump(np.column_stack([0.0 * across, across, across]), h)
     bed = np.zeros(0)
     if parameters.seabed is not None:
@@ -138,7 +139,7 @@ def _line(parameters: PipeParameters, s: Array) -> Line:
         drag=0.5 * density * diameter[:, None] * section(lambda one: (one.drag_tangential, one.drag_normal)),
         diameter=diameter,
         mass=_lump(mass[:, None], h)[:, 0],
-        offset=np.diff(h, prepend=0.0, append=0.0) / 6.0,
+        offset=_ahead(carried.across, h),
         inertia=_lump(section(lambda one: one.inertia), h),
         spin_damping=_lump(section(lambda one: one.rotational_damping), h),
         added_mass=added,
@@ -149,6 +150,12 @@ def _line(parameters: PipeParameters, s: Array) -> Line:
         numerical_damping=float(parameters.numerical_damping),
     )
     return line
+
+
+def _ahead(mass: Array, h: Array) -> Array:
+    """Centres of the lumped masses ahead of their nodes (n,) [m]: the couples m h^2 / 12 of both elements over the mass m h / 2 of both."""
+    couple, share = mass * h * h / 12.0, 0.5 * mass * h
+    return np.diff(couple, prepend=0.0, append=0.0) / (np.append(share, 0.0) + np.append(0.0, share))
 
 
 def mass_per_length(parameters: PipeParameters, s: Array) -> section_forces.MassPerLength:
