@@ -25,9 +25,6 @@ def hold_foot(line, quaternion, diagonal, upper):
             coupling[i, j] = 0.0
     if line.foot_clamped:
         return
-    for i in range(3):
-        for j in range(3):
-            block[3 + i, j] = 0.0  # times no displacement; beside them a held row is no pivot, and moves by round-off
     axis = axis_of_foot(quaternion)
     stiffness = line.stiffness[0, 3] / line.length[0]
     for j in range(SIZE):

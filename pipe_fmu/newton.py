@@ -8,7 +8,7 @@ from .block_tridiagonal import SIZE, condense, factorize, substitute
 from .columns import line_columns, take
 from .compiled import inner, kernel
 from .element import STRAINS
-from .ends import axis_of_foot, condense_top, hold_foot, hold_foot_residual, top_correction, yielding
+from .ends import axis_of_foot, condense_top, hold_foot, top_correction, yielding
 from .lanes import larger
 from .node_kernel import advance
 from .so3 import dot
@@ -117,10 +117,7 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful
         for k in range(SIZE):
             guess = weights[0] * state.last[i, k] + weights[1] * state.before[i, k] + weights[2] * state.earlier[i, k]
             x[i, k] = h * guess
-    for k in range(SIZE if line.foot_clamped else 3):
-        x[0, k] = 0.0  # held, and no correction would take back what the guess makes of round-off
-    if not line.foot_clamped:
-        _stop_twist(state.quaternion, x[0])
+    _hold(line, state.quaternion, x[0])
     force, tangent = np.empty(SIZE), np.zeros((SIZE, SIZE))
     system = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n, SIZE))
     scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE), np.empty((n, SIZE))
@@ -194,7 +191,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             wanted[i] = top[i] - x[n - 1, i]
             if prescribed and (line.top_clamped or i < 3):
                 gap = max(gap, math.fabs(wanted[i]))
-        hold_foot_residual(line, quaternion, (x[0, 3], x[0, 4], x[0, 5]), residual)
+        _hold(line, quaternion, residual[0])
         floor = ROUND_OFF * force_scale + round_off
         force_scale, moment_scale = force_scale + INERTIAL * inertial_force, moment_scale + INERTIAL * inertial_moment
         size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
@@ -224,6 +221,8 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             break
         if fresh:
             hold_foot(line, quaternion, diagonal, upper)
+            if not line.foot_clamped:
+                diagonal[0, 3:, :3] = 0.0  # times no displacement; beside them a held row is no pivot, and moves by round-off
             if not factorize(diagonal, lower, upper):
                 break
             condense_top(line, diagonal[n - 1], tangent)
@@ -242,8 +241,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             break
         substitute(diagonal, upper, residual, move, correction)
         _move(x, 1.0, correction)
-        if not line.foot_clamped:
-            _stop_twist(quaternion, x[0])
+        _hold(line, quaternion, x[0])
         for i in range(SIZE):
             if prescribed and (line.top_clamped or i < 3):
                 x[n - 1, i] = top[i]
@@ -252,8 +250,15 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
 
 
 @inner
-def _stop_twist(quaternion, move):
-    """Take from the rotation in `move` (6,) of the foot what turns it about its own axis."""
+def _hold(line, quaternion, move):
+    """Take from `move` (6,) of the foot what it may not do, or from its residual what holds it.
+
+    A guess and a correction move it by round-off, which the reaction of a very short step makes work of.
+    """
+    for k in range(SIZE if line.foot_clamped else 3):
+        move[k] = 0.0
+    if line.foot_clamped:
+        return
     axis = axis_of_foot(quaternion)
     along = dot((move[3], move[4], move[5]), axis)
     for i in range(3):
