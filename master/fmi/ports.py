@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from .description import Variable, scalar_names
 from .schema import Parameter
 
 KINDS = ("Real", "Integer", "Boolean", "String")  # of FMI variables; ports are real
+_TYPES = dict(zip(KINDS, (float, int, bool, str), strict=True))
+LONGEST_TEXT = 10_000_000  # characters; a table of all nodes takes a fifth of it
 PortTable = Mapping[str, tuple[int, str | Sequence[str], str]]  # name -> (size, unit or those of the components, description)
 Ranges = Mapping[str, tuple[float | None, float | None]]  # port -> least and largest value
 
@@ -69,6 +71,15 @@ class Ports:
         if kind != own:
             raise ValueError(f"{name}: asked for as {kind}, is {own}")
         return place
+
+    def check_parameter(self, name: str, value: Any) -> None:
+        """Raise ValueError where `value` cannot be that of the parameter `name`; its range is the unit's business."""
+        if name not in self.parameters or type(value) is not _TYPES[self.parameters[name].kind]:
+            raise ValueError(f"{name} = {value!r:.80}: must be a parameter, and a value of its type")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{name} = {value}: must be finite")
+        if isinstance(value, str) and len(value) > LONGEST_TEXT:
+            raise ValueError(f"{name}: has {len(value)} characters, must have at most {LONGEST_TEXT}")
 
     def runs(self, references: Sequence[int], kind: str = "Real") -> Iterator[Run]:
         """`references` of that kind in order, cut into runs that one port can answer at once. Raises ValueError as `place`."""
