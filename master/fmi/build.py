@@ -112,7 +112,7 @@ def cache_folder(kind: str) -> Path:
 def cached_fmu(recipe: Recipe, folder: Path) -> Path:
     """The FMU of this recipe in `folder`, built if it is not there: ``folder/Pipe_<hash>.fmu``."""
     path = folder / f"{recipe.name}_{recipe.digest}.fmu"
-    return path if path.is_file() else build_fmu(recipe, path)
+    return path if zipfile.is_zipfile(path) else build_fmu(recipe, path)
 
 
 def compile_kernels(recipe: Recipe, fmu: Path) -> None:
@@ -166,7 +166,7 @@ def _digest(parts: Mapping[str, str | bytes]) -> str:
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
     for source in ("entry.py", "runtime.py", "loader.c", "portable.py"):
         digest.update((HERE / source).read_bytes())
-    digest.update(sys.executable.encode())
+    digest.update(portable.interpreter().encode())
     for name, content in sorted(parts.items()):
         data = content.encode() if isinstance(content, str) else content
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
@@ -185,7 +185,7 @@ def _finish(recipe: Recipe, raw: Path, finished: Path) -> None:
         contents[name] = loader.library(cache_folder("loaders"))
     contents["resources/runtime.py"] = (HERE / "runtime.py").read_bytes()
     contents |= licenses.of_package("pipelay") | licenses.of_package("pythonfmu")
-    contents["resources/python.txt"] = sys.executable.encode()
+    contents["resources/python.txt"] = portable.interpreter().encode()
     if recipe.portable:
         if not (compiled := _kernels(recipe, contents)):
             place = cache_folder("units")
