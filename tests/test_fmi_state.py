@@ -256,6 +256,22 @@ def test_what_it_says_it_can_do_it_can(exported):
             fmu.derivatives("force", "velocity")
 
 
+@pytest.mark.parametrize("unit", UNITS)
+def test_a_nanosecond_is_a_step_at_a_time_that_differs_by_round_off(exported, unit):
+    """200 steps of 0.05 s add up to 10.000000000000002 s; the host goes on at 10 s."""
+    with Fmu(exported / f"{unit}.fmu") as fmu:
+        fmu.initialize()
+        time = 0.0
+        for _ in range(200):
+            fmu.step(time, 0.05)
+            time += 0.05
+        assert time > 10.0
+        before = fmu.get(tuple(name for name in fmu.names("output") if name.endswith(("position", "quaternion"))))
+        fmu.step(10.0, 1e-9)
+        after = fmu.get(tuple(name for name in fmu.names("output") if name.endswith(("position", "quaternion"))))
+        np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-8)  # m: slower than 10 m/s
+
+
 def test_the_vessel_starts_with_the_pull_of_the_pipe_so_that_both_rest_where_nothing_is_connected(exported):
     with Fmu(exported / "pipe.fmu") as pipe, Fmu(exported / "vessel.fmu") as vessel:
         pipe.initialize()

@@ -4,10 +4,10 @@ Travels inside every exported FMU (relative imports only) and drives any class o
 INPUTS, outputs(), initialize(), step(), output(), state (a tree of tuples, numbers and arrays, which has the layout of all
 states from the unit's making on), and where there is one `remark`, what the log should say of a step that was done; RANGES
 of its ports and their nominal() values by unit of measure. Answers to the host (see `failure`):
-  - a step that does not converge, meets a number that is not finite, or is asked for out of order: logged, discard,
+  - a step that does not converge, meets an input that is not finite, or is asked for out of order: logged, discard,
     the unit stands where it stood before;
-  - a refused parameter or initialisation, and a bug: fmi2Error with the message (fmi2Fatal under PythonFMU's own library), the process
-    lives on.
+  - a step of no length or beyond a defined stop time, a refused parameter or initialisation, and a bug: fmi2Error with the
+    message (fmi2Fatal under PythonFMU's own library), the unit stands where it stood, the process lives on.
 Statics and everything else that initialisation costs is done when the first output is asked for, or at the end of
 initialisation mode.
 """
@@ -37,6 +37,7 @@ PHASES = ("not initialised", "initialising", "initialised", "terminated")
 START = "start."  # before the name of a parameter that has the name of a port, whose start value it is
 BROKEN_ARITHMETIC = (ArithmeticError, ValueError, np.linalg.LinAlgError)  # a failed step, not a bug
 TIME_TOLERANCE = 1e-6  # of a step: hosts add up their time in ways of their own
+TIME_ROUNDING = 1e-12  # of the time, however short the step: what round-off makes of the sum of 50,000 steps
 
 
 def _getter(kind: str) -> Callable[[UnitSlave, list[int]], list[Any]]:
@@ -69,7 +70,7 @@ class UnitSlave(Fmi2Slave):
         self.inputs = self.ports.start.copy()
         self._run_of_inputs = list(range(self.ports.n_inputs))
         self.changed: Mapping[str, Any] = {}  # parameters set by the host; replaced, never mutated
-        self.phase, self.time = PHASES[0], 0.0
+        self.phase, self.time, self.stop = PHASES[0], 0.0, math.inf
         self.unit: Any = None
         self._runs: dict[tuple[object, ...], list[Run]] = {}
 
@@ -93,7 +94,9 @@ class UnitSlave(Fmi2Slave):
         self._expect("not initialised", "set-up of the experiment")
         if not math.isfinite(start_time):
             raise Refused(f"start time = {start_time}: must be finite")
-        self.time = start_time
+        if stop_time is not None and not stop_time >= start_time:
+            raise Refused(f"stop time = {stop_time}: must be >= the start time, {start_time} s")
+        self.time, self.stop = start_time, math.inf if stop_time is None else stop_time
 
     @guarded
     def enter_initialization_mode(self) -> None:
@@ -136,10 +139,13 @@ class UnitSlave(Fmi2Slave):
     def _step(self, time: float, step: float) -> str | None:
         if self.phase != "initialised":
             return f"step at {time:.9g} s: the FMU is {self.phase}"
-        if not (math.isfinite(step) and step > 0.0):
-            return f"step = {step}: must be > 0 s"
-        if not abs(time - self.time) <= TIME_TOLERANCE * step:
+        if not (math.isfinite(time) and math.isfinite(step) and step > 0.0):
+            raise Refused(f"step of {step} s at {time} s: must be finite, and the step > 0 s")
+        tolerance = max(TIME_TOLERANCE * step, TIME_ROUNDING * abs(time))
+        if abs(time - self.time) > tolerance:
             return f"time = {time!r}: the FMU stands at {self.time!r} s"
+        if time + step > self.stop + tolerance:
+            raise Refused(f"step to {time + step!r} s: the stop time is {self.stop!r} s")
         held = self.ports.held(self.inputs)
         before = self.unit.state
         try:
