@@ -80,7 +80,7 @@ def test_variables_carry_unit_range_and_description(files):
     assert variables["stiffness"][0].attrib == {"start": "1.0", "min": "0.0", "unit": "N/m"}
     assert variables["coils"][0].attrib == {"start": "3", "min": "1", "max": "9"}
     assert variables["failure.above"].get("variability") == "fixed"
-    assert model(files[0]).find("CoSimulation").get("needsExecutionTool") == "false"
+    assert model(files[0]).find("CoSimulation").get("needsExecutionTool") == "true"  # a Python on the machine
     assert model(files[1]).get("description") == "A rigid body"
 
 

@@ -60,6 +60,7 @@ class UnitSlave(Fmi2Slave):
         for name, value in about["about"].items():  # modelName, guid, author, license, version, description
             setattr(self, name, value)
         self.default_experiment = DefaultExperiment(**about["experiment"]) if about["experiment"] else None
+        self._nominal = about["nominal"]  # by port, before those by unit of measure
         self.parameters = schema.build(self.unit_class.PARAMETERS, about["parameters"])
         inputs, outputs = self.unit_class.INPUTS, self.unit_class.outputs(self.parameters)
         fields, taken = schema.flatten(self.parameters), {*inputs, *outputs}
@@ -84,7 +85,7 @@ class UnitSlave(Fmi2Slave):
     def variables(self) -> list[Variable]:
         """Scalar variables in the order of their value references."""
         unit = self.unit_class
-        nominal = unit.nominal(self.parameters) if hasattr(unit, "nominal") else {}
+        nominal = (unit.nominal(self.parameters) if hasattr(unit, "nominal") else {}) | self._nominal
         return self.ports.variables(getattr(unit, "RANGES", {}), nominal)
 
     # life cycle

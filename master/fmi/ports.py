@@ -106,7 +106,7 @@ class Ports:
         return f"{name}[{i + 1}] = {inputs[bad]}: must be finite"
 
     def variables(self, ranges: Ranges, nominal: Mapping[str, float]) -> list[Variable]:
-        """Scalar variables for the model description, in the order of their value references; `nominal` values by unit of measure."""
+        """Scalar variables for the model description, by value reference; `nominal` values by port or unit of measure."""
         ports, table = self.inputs | self.outputs, []
         for reference, (causality, name, i) in enumerate(self._places):
             if causality == "parameter":
@@ -116,6 +116,6 @@ class Ports:
             size, units, doc = ports[name]
             unit = units if isinstance(units, str) else units[i]
             start = float(self.start[reference]) if causality == "input" else None
-            bounds = ranges.get(name, (None, None))
-            table.append(Variable(scalar_names(name, size)[i], causality, "Real", unit, doc, start, *bounds, nominal.get(unit)))
+            bounds, size_of = ranges.get(name, (None, None)), nominal.get(name, nominal.get(unit))
+            table.append(Variable(scalar_names(name, size)[i], causality, "Real", unit, doc, start, *bounds, size_of))
         return table
