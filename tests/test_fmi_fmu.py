@@ -9,12 +9,14 @@ import tempfile
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args, get_type_hints
 from xml.etree import ElementTree
 
 import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
+from units.spring_fmu.parameters import Failure
 from units.toys import BODY, SPRING, build_pair, spring_recipe
 
 from master.errors import RunError
@@ -82,6 +84,23 @@ def test_variables_carry_unit_range_and_description(files):
     assert variables["failure.above"].get("variability") == "fixed"
     assert model(files[0]).find("CoSimulation").get("needsExecutionTool") == "true"  # a Python on the machine
     assert model(files[1]).get("description") == "A rigid body"
+
+
+def test_a_choice_of_texts_is_an_enumeration_with_its_items(files):
+    """FMI 2.0.4, 2.2.3: numbers from 1 on, names of types that are not those of variables; a host sets and gets the numbers."""
+    variable = next(v for v in fmpy.read_model_description(str(files[0])).modelVariables if v.name == "failure.kind")
+    assert (variable.type, variable.start, variable.declaredType.name) == ("Enumeration", "1", "failure.kind.items")
+    items = [(item.name, int(item.value)) for item in variable.declaredType.items]
+    assert items == list(zip(get_args(get_type_hints(Failure)["kind"]), range(1, 10), strict=True))
+    with Fmu(files[0]) as fmu:
+        for given, number in (("arithmetic", 2), (3, 3)):
+            fmu._set_parameter("failure.kind", given)
+            assert fmu._fmu.getInteger([variable.valueReference]) == [number]
+        fmu.initialize({"failure.above": 0.0})
+        with pytest.raises(StepFailed, match="planted bug"):  # the third
+            fmu.step(0.0, 0.1)
+    with zipfile.ZipFile(files[0]) as archive:
+        assert "<td>failure.kind</td><td>1</td><td></td><td>message</td>" in archive.read("documentation/index.html").decode()
 
 
 @pytest.mark.parametrize(
@@ -275,11 +294,13 @@ WRONG_STARTS = {
     "has no parameter 'stifness'; there are stiffness,": {"stifness": 1.0},
     "offset = .*: must have 3 values": {"offset": [1.0, 2.0]},
     "coils = 2.5: must be of type Integer": {"coils": 2.5},
-    "failure.kind = 3: must be of type String": {"failure.kind": 3},
+    "failure.kind = 12: must be one of 1 .message., 2 .arithmetic.,": {"failure.kind": 12},
+    "failure.kind = 0: must be one of 1 .message., 2 .arithmetic.,": {"failure.kind": 0},
+    "failure.kind = 2.5: must be one of message, arithmetic,": {"failure.kind": 2.5},
     "configuration = 'no': must be JSON": {"configuration": "no"},
     "configuration.stifness = 1: unknown key": {"configuration": '{"stifness": 1}'},
     "configuration: changes the output failing; such an FMU must be exported anew": {"configuration": "{}"},
-    "failure.kind = 'odd': must be one of": {"failure.kind": "odd"},
+    "failure.kind = odd: must be one of message, arithmetic,": {"failure.kind": "odd"},
     "sections = .*: must be JSON": {"sections": "[1,"},
 }
 

@@ -122,6 +122,7 @@ def test_forged_bytes_are_refused_by_guid_phase_parameters_and_layout(spring):
         ("changed", {"hardening": True}, "hardening = True: must be a parameter, and a value of its type"),
         ("changed", {"grip": 1.0}, "grip = 1.0: must be a parameter, and a value of its type"),
         ("changed", {"hardening": float("inf")}, "hardening = inf: must be finite"),
+        ("changed", {"configuration": 1}, "configuration = 1: must be a parameter, and a value of its type"),
         ("changed", {"stiffness": -1.0}, "stiffness = -1.0: must be >= 0"),
         ("layout", [["0", "<f8", [6]], ["1.y", *layout[1][1:]], *layout[2:]], "of another layout: has ['1.y', '<f8', [6]]"),
         ("layout", [layout[0], ["1.x", "<f8", [3, 2]], *layout[2:]], "of another layout: has ['1.x', '<f8', [3, 2]]"),

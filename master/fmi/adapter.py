@@ -193,8 +193,8 @@ class UnitSlave(Fmi2Slave):
             elif self.phase == "initialised":
                 raise Refused(f"{name} = {value}: a parameter cannot be set after initialisation")
             else:
-                self.ports.check_parameter(name, value)
-                changed[name] = value
+                changed[name] = self.ports.as_item(name, value)
+                self.ports.check_parameter(name, changed[name])
         self.inputs[:], self.changed = inputs, changed
         if self.phase != "initialised":
             self.unit = None
@@ -206,7 +206,7 @@ class UnitSlave(Fmi2Slave):
             return (self._ready() if unit is None else unit).output(name)[part].tolist()
         if causality == "input":
             return self.inputs[self.ports.input_slices[name]][part].tolist()
-        return [self.changed.get(name, self.ports.parameters[name].value)]
+        return [self.ports.as_number(name, self.changed.get(name, self.ports.parameters[name].value))]
 
     # state
 
