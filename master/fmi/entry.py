@@ -89,8 +89,9 @@ def _copy(source: str | Path, target: str | Path) -> None:
 def _mend(place: Path, bundled: Path) -> None:
     """Make anew what a full disk or a loss of power has cut short: kernels go, files differing from the bundled ones are replaced."""
     for kernel in place.glob("**/__pycache__/*.nb[ci]"):
-        if not _is_pickled(kernel):
-            kernel.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):  # another process has dropped it
+            if not _is_pickled(kernel):
+                kernel.unlink()
     for source in (path for path in bundled.rglob("*") if path.is_file()):
         target = place / source.relative_to(bundled)
         if target.is_file() and (source.parent.name == "__pycache__" or target.read_bytes() == source.read_bytes()):
