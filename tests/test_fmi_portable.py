@@ -136,7 +136,7 @@ def test_a_plain_fmu_says_there_that_its_python_is_gone(plain, bare):
     folder = c_host.unpacked(plain / "pipe.fmu", bare / "plain")
     done = c_host.run([CHROOT, str(bare), *command("/host", "pipe", folder, Path("/plain"), {})])
     assert done.returncode == 1
-    assert f"Python {sys.executable}: No such file or directory; set PIPELAY_PYTHON" in done.stderr
+    assert f"Python {portable.interpreter()}: No such file or directory; set PIPELAY_PYTHON" in done.stderr
 
 
 def test_a_portable_fmu_leaves_no_process_behind(carrying):
