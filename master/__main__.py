@@ -132,6 +132,7 @@ def program() -> int:
 
 
 def _perform(options: argparse.Namespace) -> int:
+    os.environ.pop("NUMBA_DISABLE_JIT", None)  # the kernels can only run compiled
     try:
         with breakable():
             from master import commands

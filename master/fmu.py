@@ -226,10 +226,13 @@ class Fmu:
         values = list(value) if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else [value]
         if len(values) != port.size:
             raise FmuFailed(f"{self.name}: {name} = {value}: must have {port.size} values")
+        kind = "Integer" if port.kind == "Enumeration" else port.kind
         try:
-            self._call(f"set {name}", getattr(self._fmu, f"set{port.kind}"), port.references, values)
+            numbers = [dict(port.items).get(value, value) for value in values]
+            self._call(f"set {name}", getattr(self._fmu, f"set{kind}"), port.references, numbers)
         except (TypeError, AttributeError):  # of ctypes and FMPy
-            raise FmuFailed(f"{self.name}: {name} = {value}: must be of type {port.kind}") from None
+            rule = f"one of {', '.join(item for item, _ in port.items)}" if port.items else f"of type {port.kind}"
+            raise FmuFailed(f"{self.name}: {name} = {value}: must be {rule}") from None
 
     def _call(self, what: str, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
         try:

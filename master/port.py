@@ -41,6 +41,7 @@ class Port:
     description: str
     references: tuple[int, ...]
     measure: Measure | None = None
+    items: tuple[tuple[str, int], ...] = ()  # of an enumeration: names and numbers
 
 
 def read_ports(model: Any) -> dict[str, Port]:
@@ -50,10 +51,14 @@ def read_ports(model: Any) -> dict[str, Port]:
     for variable in model.modelVariables:
         groups.setdefault(re.sub(r"\[\d+\]$", "", variable.name), []).append(variable)
     return {
-        name: Port(name, len(group), it.unit or "", it.causality, it.type, it.description or "", references, units.get(it.unit))
+        name: Port(name, len(group), it.unit or "", it.causality, it.type, it.description or "", references, units.get(it.unit), _items(it))
         for name, group in groups.items()
         for it, references in [(group[0], tuple(variable.valueReference for variable in group))]
     }
+
+
+def _items(variable: Any) -> tuple[tuple[str, int], ...]:
+    return tuple((item.name, int(item.value)) for item in getattr(variable.declaredType, "items", ()))
 
 
 def _measure(base: Any) -> Measure:

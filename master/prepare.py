@@ -23,6 +23,10 @@ PACKAGES: dict[str, tuple[str, dict[str, Any]]] = {
     "pipe_fmu": ("slave.PipeUnit", {"mesh": "uniform"}),  # an adapted one takes statics
     "vessel_fmu": ("slave.VesselUnit", {}),
 }
+_BOND = {  # unit of measure -> the vessel's ports of what pipe and vessel exchange
+    "N": ("force", "force_change"), "N.m": ("moment", "moment_change"),
+    "m/s": ("velocity", "end_velocity"), "rad/s": ("angular_velocity", "end_angular_velocity"),
+}  # fmt: skip
 
 
 def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False) -> dict[str, Any]:
@@ -30,6 +34,7 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
     scene = from_mapping(mapping, "scene")
     folders = let_stand_in(PACKAGES)
     from master import statics  # of the packages that now stand in
+    from pipe_fmu.slave import PipeUnit
 
     at = statics.released(scene, statics.equilibrium(scene))
     simulation = scene.sections.simulation
@@ -37,6 +42,8 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
     pull = (0.0 - at.found.top).tolist()  # no -0.0 among them
     pipe = replace(at.pipe, reference_force=tuple(pull[:3]), reference_moment=tuple(pull[3:]))
     units: dict[str, Any] = {"pipe": pipe} | ({} if at.vessel is None else {"vessel": at.vessel})
+    nominal = PipeUnit.nominal(pipe)
+    shared = {"vessel": {port: nominal[unit] for unit, ports in _BOND.items() for port in ports}}
     held = {"vessel": {"force": pull[:3], "moment": pull[3:]}}
     recipes = {
         name: Recipe(
@@ -46,6 +53,7 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
             experiment=experiment,
             inputs=held.get(name, {}),
             portable=portable,
+            nominal=shared.get(name, {}),
         )
         for name, parameters in units.items()
     }

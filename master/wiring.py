@@ -12,7 +12,9 @@ from master.fmu import Fmu, FmuFailed
 from master.port import ENERGY, POWER, Port
 from master.units import General, PairOfPorts
 
-TYPES: dict[str, tuple[type, ...]] = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,)}  # of FMI variables; others are texts
+TYPES: dict[str, tuple[type, ...]] = {  # of FMI variables; others are texts
+    "Real": (float, int), "Integer": (int,), "Boolean": (bool,), "Enumeration": (str, int),
+}  # fmt: skip
 WHOLE = 1e-12  # of a number: this close it is whole but for round-off
 
 

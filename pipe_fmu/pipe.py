@@ -35,6 +35,12 @@ class Pipe:
         found = self.equilibrium(self.parameters.top_position, attitude if attitude.any() else None, time)
         return found, self.at_rest(found, time)
 
+    def straight(self) -> PipeState:
+        """State of rest of the unstretched line along x: no equilibrium, but of the layout of all states."""
+        position, quaternion = np.zeros((len(self.s), 3)), np.zeros((len(self.s), 4))
+        position[:, 0], quaternion[:, 0] = self.s, 1.0
+        return integrator.rest(self.line, position, quaternion, 0.0)
+
     def at_rest(self, found: Equilibrium, time: float = 0.0) -> PipeState:
         """State of rest in an equilibrium."""
         return integrator.rest(self.line, found.position, found.quaternion, time)

@@ -47,7 +47,7 @@ class PipeUnit:
 
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
-        self.state: Any = None
+        self.state: Any = (self._pipe.straight(), np.zeros(6), np.zeros((6, 6)), 0, 0.0)  # of the right layout; see `initialize`
         self.remark = ""  # what the host's log should say of the start, or of the last step that was done
         self._most = parameters.max_substeps
         self._reference = np.array([*parameters.reference_force, *parameters.reference_moment])

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import fmpy
 from fmpy import fmi2
 
-from master.fmi.adapter import LONGEST_TEXT
+from master.fmi.ports import LONGEST_TEXT
 
 OK, DISCARD, ERROR = 0, 2, 3
 GOOD, BAD = (OK,), (DISCARD, ERROR)

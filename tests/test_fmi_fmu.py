@@ -9,12 +9,14 @@ import tempfile
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args, get_type_hints
 from xml.etree import ElementTree
 
 import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
+from units.spring_fmu.parameters import Failure
 from units.toys import BODY, SPRING, build_pair, spring_recipe
 
 from master.errors import RunError
@@ -80,8 +82,25 @@ def test_variables_carry_unit_range_and_description(files):
     assert variables["stiffness"][0].attrib == {"start": "1.0", "min": "0.0", "unit": "N/m"}
     assert variables["coils"][0].attrib == {"start": "3", "min": "1", "max": "9"}
     assert variables["failure.above"].get("variability") == "fixed"
-    assert model(files[0]).find("CoSimulation").get("needsExecutionTool") == "false"
+    assert model(files[0]).find("CoSimulation").get("needsExecutionTool") == "true"  # a Python on the machine
     assert model(files[1]).get("description") == "A rigid body"
+
+
+def test_a_choice_of_texts_is_an_enumeration_with_its_items(files):
+    """FMI 2.0.4, 2.2.3: numbers from 1 on, names of types that are not those of variables; a host sets and gets the numbers."""
+    variable = next(v for v in fmpy.read_model_description(str(files[0])).modelVariables if v.name == "failure.kind")
+    assert (variable.type, variable.start, variable.declaredType.name) == ("Enumeration", "1", "failure.kind.items")
+    items = [(item.name, int(item.value)) for item in variable.declaredType.items]
+    assert items == list(zip(get_args(get_type_hints(Failure)["kind"]), range(1, 10), strict=True))
+    with Fmu(files[0]) as fmu:
+        for given, number in (("arithmetic", 2), (3, 3)):
+            fmu._set_parameter("failure.kind", given)
+            assert fmu._fmu.getInteger([variable.valueReference]) == [number]
+        fmu.initialize({"failure.above": 0.0})
+        with pytest.raises(StepFailed, match="planted bug"):  # the third
+            fmu.step(0.0, 0.1)
+    with zipfile.ZipFile(files[0]) as archive:
+        assert "<td>failure.kind</td><td>1</td><td></td><td>message</td>" in archive.read("documentation/index.html").decode()
 
 
 @pytest.mark.parametrize(
@@ -244,8 +263,11 @@ def test_broken_arithmetic_is_a_failed_step_and_a_bug_is_not(files):
 
 
 WRONG_STEPS = {
-    r"step = -0.1: must be > 0 s": lambda fmu: fmu.step(0.0, -0.1),
-    r"step = nan: must be > 0 s": lambda fmu: fmu.step(0.0, np.nan),
+    r"step of -0.1 s at 0.0 s: must be finite, and the step > 0 s": lambda fmu: fmu.step(0.0, -0.1),
+    r"step of 0.0 s at 0.0 s: must be finite": lambda fmu: fmu.step(0.0, 0.0),
+    r"step of nan s at 0.0 s: must be finite": lambda fmu: fmu.step(0.0, np.nan),
+    r"step of inf s at 0.0 s: must be finite": lambda fmu: fmu.step(0.0, np.inf),
+    r"step of 0.1 s at nan s: must be finite": lambda fmu: fmu.step(np.nan, 0.1),
     r"time = 3.0: the FMU stands at 0.0 s": lambda fmu: fmu.step(3.0, 0.1),
     r"velocity\[2\] = nan: must be finite": lambda fmu: (fmu.set("velocity", [0, np.nan, 0]), fmu.step(0.0, 0.1)),
     r"angular_velocity\[1\] = inf: must be": lambda fmu: (fmu.set("angular_velocity", [np.inf, 0, 0]), fmu.step(0, 0.1)),
@@ -272,11 +294,13 @@ WRONG_STARTS = {
     "has no parameter 'stifness'; there are stiffness,": {"stifness": 1.0},
     "offset = .*: must have 3 values": {"offset": [1.0, 2.0]},
     "coils = 2.5: must be of type Integer": {"coils": 2.5},
-    "failure.kind = 3: must be of type String": {"failure.kind": 3},
+    "failure.kind = 12: must be one of 1 .message., 2 .arithmetic.,": {"failure.kind": 12},
+    "failure.kind = 0: must be one of 1 .message., 2 .arithmetic.,": {"failure.kind": 0},
+    "failure.kind = 2.5: must be one of message, arithmetic,": {"failure.kind": 2.5},
     "configuration = 'no': must be JSON": {"configuration": "no"},
     "configuration.stifness = 1: unknown key": {"configuration": '{"stifness": 1}'},
     "configuration: changes the output failing; such an FMU must be exported anew": {"configuration": "{}"},
-    "failure.kind = 'odd': must be one of": {"failure.kind": "odd"},
+    "failure.kind = odd: must be one of message, arithmetic,": {"failure.kind": "odd"},
     "sections = .*: must be JSON": {"sections": "[1,"},
 }
 
@@ -286,6 +310,80 @@ def test_a_wrong_parameter_is_refused_in_one_line(files, message):
     with Fmu(files[0], "spring") as fmu, pytest.raises(FmuFailed, match=message) as caught:
         fmu.initialize(WRONG_STARTS[message])
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("times", [(0.0, -1.0), (2.0, 1.0), (0.0, np.nan), (np.nan, 1.0), (np.inf, np.inf)])
+def test_a_stop_before_the_start_and_times_that_are_no_numbers_are_refused(files, times):
+    with Fmu(files[1]) as fmu, pytest.raises(FmuFailed, match=r"(start|stop) time = .*: must be"):
+        fmu._call("setup", fmu._fmu.setupExperiment, startTime=times[0], stopTime=times[1])
+
+
+def begun(fmu: Fmu, stop: float | None) -> None:
+    fmu._fmu.setupExperiment(startTime=0.0, stopTime=stop)
+    fmu._fmu.enterInitializationMode()
+    fmu._fmu.exitInitializationMode()
+
+
+def test_a_step_beyond_a_defined_stop_time_is_an_error_and_changes_nothing(files):
+    """FMI 2.0.4, 2.1.6: past a defined stop time the FMU has to return fmi2Error; round-off of the host's sum is no step beyond."""
+    with Fmu(files[1], "body") as fmu:
+        begun(fmu, 1.0)
+        fmu.set(EFFORTS, np.ones(6))
+        time = 0.0
+        for _ in range(10):
+            fmu.step(time, 0.1)
+            time += 0.1
+        before = fmu.get("position")
+        assert before[0] == pytest.approx(0.5)
+        for step in (0.1, 1e-3, 1e-6):
+            with pytest.raises(StepFailed, match=r"body: step of .* step to 1.* s: the stop time is 1.0 s"):
+                fmu.step(time, step)
+        np.testing.assert_array_equal(fmu.get("position"), before)
+    with Fmu(files[1]) as fmu:
+        begun(fmu, 1.0)
+        with pytest.raises(StepFailed, match=r"the stop time is 1\.0 s"):
+            fmu.step(0.0, 1.0001)
+        fmu.step(0.0, 1.0)
+    with Fmu(files[1]) as fmu:
+        begun(fmu, None)
+        fmu.step(0.0, 1e6)
+
+
+def test_a_state_goes_on_beyond_the_stop_time_of_the_run_that_saved_it(files):
+    with Fmu(files[1]) as one, Fmu(files[1]) as two:
+        begun(one, 1.0)
+        begun(two, 9.0)
+        one.step(0.0, 1.0)
+        two.restore(two.deserialize(one.serialize(one.snapshot())))
+        two.step(1.0, 8.0)
+        with pytest.raises(StepFailed, match=r"the stop time is 9\.0 s"):
+            two.step(9.0, 1.0)
+
+
+@pytest.mark.parametrize("interval", [0.1, 0.3, 0.07])
+def test_fmpy_reaches_its_stop_time_whatever_its_interval(files, interval):
+    wanted = {"start_values": {"load[1]": 2.0}, "output": ["position[1]"]}
+    result = fmpy.simulate_fmu(str(files[1]), stop_time=1.0, output_interval=interval, **wanted)
+    assert result["time"][-1] == pytest.approx(1.0)
+    assert result["position[1]"][-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("count", [200, 20_000])
+def test_a_step_however_short_is_taken_at_a_time_that_differs_by_round_off(files, count):
+    """Steps of 0.05 s add up to 10.000000000000002 s, and to 1000 s less 4e-10 s; then the host asks for the round time."""
+    with Fmu(files[1]) as fmu:
+        fmu.initialize(inputs={"force": [1.0, 0.0, 0.0]})
+        time = 0.0
+        for _ in range(count):
+            fmu.step(time, 0.05)
+            time += 0.05
+        assert time != 0.05 * count
+        before = fmu.get("velocity")[0]
+        fmu.step(0.05 * count, 1e-9)
+        fmu.step(0.05 * count + 1e-9, 0.05)
+        assert fmu.get("velocity")[0] - before == pytest.approx(0.05, rel=1e-6)
+        with pytest.raises(StepRejected, match="the FMU stands at"):
+            fmu.step(0.05 * count + 0.051, 1e-9)
 
 
 def test_step_before_initialisation_is_refused(files):

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import c_host
+import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
@@ -135,7 +136,7 @@ def test_a_plain_fmu_says_there_that_its_python_is_gone(plain, bare):
     folder = c_host.unpacked(plain / "pipe.fmu", bare / "plain")
     done = c_host.run([CHROOT, str(bare), *command("/host", "pipe", folder, Path("/plain"), {})])
     assert done.returncode == 1
-    assert f"Python {sys.executable}: No such file or directory; set PIPELAY_PYTHON" in done.stderr
+    assert f"Python {portable.interpreter()}: No such file or directory; set PIPELAY_PYTHON" in done.stderr
 
 
 def test_a_portable_fmu_leaves_no_process_behind(carrying):
@@ -154,6 +155,7 @@ def test_licences_travel_and_no_problems_are_found(carrying, bare):
     for unit in UNITS:
         assert validate_fmu(str(carrying / f"{unit}.fmu")) == []
     held = c_host.unpacked(carrying / "vessel.fmu", bare / "held")
+    assert not fmpy.read_model_description(str(carrying / "vessel.fmu")).coSimulation.needsExecutionTool
     named = {path.name for path in (held / licenses.FOLDER).iterdir()}
     carried = {path.name for path in (held / portable.HOME / "lib").glob("*.so*")}
     assert named >= {"python", "numpy", "numba", "llvmlite", "pythonfmu", "pipelay"}

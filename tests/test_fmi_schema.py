@@ -66,7 +66,7 @@ def test_flat_names_units_and_ranges():
     assert flat["length"] == schema.Parameter("Real", 1200.0, "m", 0.0, None, "unstretched")
     assert flat["bed.friction"].value == 1 / 3
     assert flat["quiet"].kind == "Boolean"
-    assert flat["foot"].kind == "String"
+    assert flat["foot"] == schema.Parameter("Enumeration", "pinned", items=("clamped", "pinned"))
     assert flat["depths"].value == "[0.0,800.0]"
     assert "bed.friction" not in schema.flatten(Line(10.0))
 

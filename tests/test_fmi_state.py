@@ -17,6 +17,7 @@ import c_host
 import fmpy
 import numpy as np
 import pytest
+from fmpy.ssp.ssd import read_ssd
 from fmpy.validation import validate_fmu
 from numba import types
 
@@ -24,6 +25,7 @@ import pipe_fmu
 from master.__main__ import main
 from master.fmi.build import Recipe, build_fmu, bundled_package
 from master.fmi.description import base_unit
+from master.fmi.system import CHANGES, OMS, SSC, SSD, WIRES, Wire
 from master.fmu import Fmu, FmuFailed
 from pipe_fmu.state import PipeState
 
@@ -221,6 +223,43 @@ def test_matrices_of_mixed_units_have_those_of_their_blocks(exported, unit):
                 assert {key: power for key, power in product.items() if power} == answer, (name, i, j)
 
 
+def test_both_ends_of_a_bond_have_one_nominal_value(exported):
+    """What one end gives has the nominal value of what the other takes."""
+    nominal = {}
+    for unit in UNITS:
+        variables = fmpy.read_model_description(str(exported / f"{unit}.fmu")).modelVariables
+        nominal[unit] = {v.name: float(v.nominal) for v in variables if v.causality != "parameter" and v.nominal}
+    means = (Wire("vessel", name, "pipe", name) for name in ("velocity", "angular_velocity"))
+    pairs = [*WIRES, *CHANGES, *means]
+    for source, output, target, taken in pairs:
+        for i in (1, 2, 3):
+            assert nominal[source][f"{output}[{i}]"] == nominal[target][f"{taken}[{i}]"]
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_an_fmu_holds_the_binary_of_linux_alone_and_an_entry_to_its_licences(exported, unit):
+    """FMI 2.0.4, 2.3. PythonFMU's library for Windows cannot load without a Python of its version on the path."""
+    with zipfile.ZipFile(exported / f"{unit}.fmu") as archive:
+        names = archive.namelist()
+        entry = archive.read("documentation/licenses/license.txt").decode()
+    assert {name.split("/")[1] for name in names if name.startswith("binaries/")} == {"linux64"}
+    assert entry.startswith(f"{unit.capitalize()}: MIT, ")
+    folders = {name.split("/")[2] for name in names if name.startswith("documentation/licenses/")} - {"license.txt"}
+    assert folders == {"pipelay", "pythonfmu"}
+
+
+def test_the_ssp_tells_omsimulator_its_fixed_step(exported):
+    """OMSimulator reads the step and the kind of master from its own annotation of the system alone."""
+    with zipfile.ZipFile(exported / "system.ssp") as archive:
+        root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+    spaces = {"ssd": SSD, "ssc": SSC, "oms": OMS}
+    path = "ssd:System/ssd:Annotations/ssc:Annotation[@type='org.openmodelica']/oms:Annotations/oms:SimulationInformation/"
+    assert float(root.find(f"{path}oms:FixedStepMaster", spaces).get("stepSize")) == STEP  # s, the macro step of the paper's scene
+    order = [child.tag.partition("}")[2] for child in root.find("ssd:System", spaces)]
+    assert order == ["Elements", "Connections", "Annotations"]  # as the schema has them
+    assert read_ssd(str(exported / "system.ssp")).system.connections
+
+
 @pytest.mark.parametrize("unit", UNITS)
 def test_outputs_keep_to_their_ranges_and_sizes(exported, unit):
     """Ranges hold throughout; the largest value of a kind of output is not a thousand times its nominal one."""
@@ -242,7 +281,8 @@ def test_what_it_says_it_can_do_it_can(exported):
     for unit in UNITS:
         model = fmpy.read_model_description(str(exported / f"{unit}.fmu")).coSimulation
         assert (model.canHandleVariableCommunicationStepSize, model.canGetAndSetFMUstate, model.canSerializeFMUstate) == (True,) * 3
-        assert (model.canInterpolateInputs, model.providesDirectionalDerivative, model.needsExecutionTool) == (False,) * 3
+        assert (model.canInterpolateInputs, model.providesDirectionalDerivative) == (False,) * 2
+        assert model.needsExecutionTool  # a Python on the machine
         assert (model.canBeInstantiatedOnlyOncePerProcess, model.canRunAsynchronuously, model.maxOutputDerivativeOrder) == (False, False, 0)
     with Fmu(exported / "pipe.fmu") as fmu:
         fmu.initialize()
@@ -254,6 +294,22 @@ def test_what_it_says_it_can_do_it_can(exported):
             np.testing.assert_allclose(fmu.get("top_position"), start + velocity * time, atol=1e-11)
         with pytest.raises(FmuFailed, match="directional derivatives: not offered"):
             fmu.derivatives("force", "velocity")
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_a_nanosecond_is_a_step_at_a_time_that_differs_by_round_off(exported, unit):
+    """200 steps of 0.05 s add up to 10.000000000000002 s; the host goes on at 10 s."""
+    with Fmu(exported / f"{unit}.fmu") as fmu:
+        fmu.initialize()
+        time = 0.0
+        for _ in range(200):
+            fmu.step(time, 0.05)
+            time += 0.05
+        assert time > 10.0
+        before = fmu.get(tuple(name for name in fmu.names("output") if name.endswith(("position", "quaternion"))))
+        fmu.step(10.0, 1e-9)
+        after = fmu.get(tuple(name for name in fmu.names("output") if name.endswith(("position", "quaternion"))))
+        np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-8)  # m: slower than 10 m/s
 
 
 def test_the_vessel_starts_with_the_pull_of_the_pipe_so_that_both_rest_where_nothing_is_connected(exported):

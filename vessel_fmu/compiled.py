@@ -12,7 +12,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 
 
 def drop_stale_cache(package: Path) -> int:
@@ -28,6 +28,8 @@ def drop_stale_cache(package: Path) -> int:
     return len(indices)
 
 
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    raise ImportError("NUMBA_DISABLE_JIT is set, but the kernels can only run compiled")
 drop_stale_cache(Path(__file__).parent)
 
 kernel = njit(cache=True, error_model="numpy")

@@ -1,25 +1,24 @@
 """A unit as an FMI 2.0 co-simulation slave: ports, parameters, state and errors; no physics.
 
 Travels inside every exported FMU (relative imports only) and drives any class of the unit protocol: PARAMETERS,
-INPUTS, outputs(), initialize(), step(), output(), state, and where there is one `remark`, what the log should say of a
-step that was done; RANGES of its ports and their nominal() values by unit of measure. Answers to the host (see `failure`):
-  - a step that does not converge, meets a number that is not finite, or is asked for out of order: logged, discard,
+INPUTS, outputs(), initialize(), step(), output(), state (a tree of tuples, numbers and arrays, which has the layout of all
+states from the unit's making on), and where there is one `remark`, what the log should say of a step that was done; RANGES
+of its ports and their nominal() values by unit of measure. Answers to the host (see `failure`):
+  - a step that does not converge, meets an input that is not finite, or is asked for out of order: logged, discard,
     the unit stands where it stood before;
-  - a refused parameter or initialisation, and a bug: fmi2Error with the message (fmi2Fatal under PythonFMU's own library), the process
-    lives on.
+  - a step of no length or beyond a defined stop time, a refused parameter or initialisation, and a bug: fmi2Error with the
+    message (fmi2Fatal under PythonFMU's own library), the unit stands where it stood, the process lives on.
 Statics and everything else that initialisation costs is done when the first output is asked for, or at the end of
 initialisation mode.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
-import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -31,23 +30,14 @@ from . import schema
 from .description import Variable, fill
 from .failure import Refused, guarded, printable, where
 from .ports import KINDS, Ports, PortTable, Run
+from .state import Snapshot, read_header, rebuild, to_bytes
 
 CONFIGURATION = "configuration"
+PHASES = ("not initialised", "initialising", "initialised", "terminated")
 START = "start."  # before the name of a parameter that has the name of a port, whose start value it is
 BROKEN_ARITHMETIC = (ArithmeticError, ValueError, np.linalg.LinAlgError)  # a failed step, not a bug
-LONGEST_TEXT = 10_000_000  # characters; a table of all nodes takes a fifth of it
 TIME_TOLERANCE = 1e-6  # of a step: hosts add up their time in ways of their own
-
-
-class Snapshot(NamedTuple):
-    """Everything a rollback needs; the unit's state is an immutable value, so this is a handful of references."""
-
-    guid: str
-    phase: str
-    time: float
-    inputs: bytes
-    changed: dict[str, Any]
-    unit: Any
+TIME_ROUNDING = 1e-12  # of the time, however short the step: what round-off makes of the sum of 50,000 steps
 
 
 def _getter(kind: str) -> Callable[[UnitSlave, list[int]], list[Any]]:
@@ -70,6 +60,7 @@ class UnitSlave(Fmi2Slave):
         for name, value in about["about"].items():  # modelName, guid, author, license, version, description
             setattr(self, name, value)
         self.default_experiment = DefaultExperiment(**about["experiment"]) if about["experiment"] else None
+        self._nominal = about["nominal"]  # by port, before those by unit of measure
         self.parameters = schema.build(self.unit_class.PARAMETERS, about["parameters"])
         inputs, outputs = self.unit_class.INPUTS, self.unit_class.outputs(self.parameters)
         fields, taken = schema.flatten(self.parameters), {*inputs, *outputs}
@@ -79,8 +70,8 @@ class UnitSlave(Fmi2Slave):
         self.ports = Ports(inputs, outputs, flat, about["inputs"])
         self.inputs = self.ports.start.copy()
         self._run_of_inputs = list(range(self.ports.n_inputs))
-        self.changed: dict[str, Any] = {}  # parameters set by the host; replaced, never mutated
-        self.phase, self.time = "not initialised", 0.0
+        self.changed: Mapping[str, Any] = {}  # parameters set by the host; replaced, never mutated
+        self.phase, self.time, self.stop = PHASES[0], 0.0, math.inf
         self.unit: Any = None
         self._runs: dict[tuple[object, ...], list[Run]] = {}
 
@@ -94,7 +85,7 @@ class UnitSlave(Fmi2Slave):
     def variables(self) -> list[Variable]:
         """Scalar variables in the order of their value references."""
         unit = self.unit_class
-        nominal = unit.nominal(self.parameters) if hasattr(unit, "nominal") else {}
+        nominal = (unit.nominal(self.parameters) if hasattr(unit, "nominal") else {}) | self._nominal
         return self.ports.variables(getattr(unit, "RANGES", {}), nominal)
 
     # life cycle
@@ -104,7 +95,9 @@ class UnitSlave(Fmi2Slave):
         self._expect("not initialised", "set-up of the experiment")
         if not math.isfinite(start_time):
             raise Refused(f"start time = {start_time}: must be finite")
-        self.time = start_time
+        if stop_time is not None and not stop_time >= start_time:
+            raise Refused(f"stop time = {stop_time}: must be >= the start time, {start_time} s")
+        self.time, self.stop = start_time, math.inf if stop_time is None else stop_time
 
     @guarded
     def enter_initialization_mode(self) -> None:
@@ -147,10 +140,13 @@ class UnitSlave(Fmi2Slave):
     def _step(self, time: float, step: float) -> str | None:
         if self.phase != "initialised":
             return f"step at {time:.9g} s: the FMU is {self.phase}"
-        if not (math.isfinite(step) and step > 0.0):
-            return f"step = {step}: must be > 0 s"
-        if not abs(time - self.time) <= TIME_TOLERANCE * step:
+        if not (math.isfinite(time) and math.isfinite(step) and step > 0.0):
+            raise Refused(f"step of {step} s at {time} s: must be finite, and the step > 0 s")
+        tolerance = max(TIME_TOLERANCE * step, TIME_ROUNDING * abs(time))
+        if abs(time - self.time) > tolerance:
             return f"time = {time!r}: the FMU stands at {self.time!r} s"
+        if time + step > self.stop + tolerance:
+            raise Refused(f"step to {time + step!r} s: the stop time is {self.stop!r} s")
         held = self.ports.held(self.inputs)
         before = self.unit.state
         try:
@@ -196,12 +192,9 @@ class UnitSlave(Fmi2Slave):
                 inputs[vr] = value
             elif self.phase == "initialised":
                 raise Refused(f"{name} = {value}: a parameter cannot be set after initialisation")
-            elif isinstance(value, float) and not math.isfinite(value):
-                raise Refused(f"{name} = {value}: must be finite")
-            elif isinstance(value, str) and len(value) > LONGEST_TEXT:
-                raise Refused(f"{name}: has {len(value)} characters, must have at most {LONGEST_TEXT}")
             else:
-                changed[name] = value
+                changed[name] = self.ports.as_item(name, value)
+                self.ports.check_parameter(name, changed[name])
         self.inputs[:], self.changed = inputs, changed
         if self.phase != "initialised":
             self.unit = None
@@ -213,48 +206,46 @@ class UnitSlave(Fmi2Slave):
             return (self._ready() if unit is None else unit).output(name)[part].tolist()
         if causality == "input":
             return self.inputs[self.ports.input_slices[name]][part].tolist()
-        return [self.changed.get(name, self.ports.parameters[name].value)]
+        return [self.ports.as_number(name, self.changed.get(name, self.ports.parameters[name].value))]
 
     # state
 
     @guarded
     def _get_fmu_state(self) -> Snapshot:
         unit = None if self.unit is None else self.unit.state
-        return Snapshot(self.guid, self.phase, self.time, self.inputs.tobytes(), self.changed, unit)
+        return Snapshot(self.guid, self.phase, self.time, self.changed, self.inputs.copy(), unit)
 
     @guarded
-    def _set_fmu_state(self, state: Snapshot | Refused) -> None:
-        if isinstance(state, Refused):
-            raise state
+    def _set_fmu_state(self, state: Snapshot) -> None:
         if state.guid != self.guid:
             raise Refused(f"state: of another FMU, with the GUID {state.guid}")
         if state.unit is None or (state.changed is not self.changed and state.changed != self.changed):
             self.unit = None
         self.phase, self.time, self.changed = state.phase, state.time, state.changed
-        self.inputs[:] = np.frombuffer(state.inputs)
+        self.inputs[:] = state.inputs
         if state.unit is not None:
             if self.unit is None:
-                self.unit = self._make_unit()
+                self.unit = self._make_unit(self.changed)
             self.unit.state = state.unit
 
-    @staticmethod
-    def _fmu_state_to_bytes(state: Snapshot) -> bytes:
-        try:
-            content = pickle.dumps(tuple(state), protocol=5)
-        except Exception as error:  # no instance to protect here: the message travels in the bytes
-            content = pickle.dumps(f"state: cannot be serialised: {error}")
-        return hashlib.sha256(content).digest() + content
+    @guarded
+    def _fmu_state_to_bytes(self, state: Snapshot) -> bytes:
+        return to_bytes(state)
 
-    @staticmethod
-    def _fmu_state_from_bytes(data: bytes) -> Snapshot | Refused:
-        content = data[hashlib.sha256().digest_size :]
-        if not data.startswith(hashlib.sha256(content).digest()):
-            return Refused(f"state: cannot be read back: these {len(data)} bytes are not those of a state, or not all of them")
-        try:
-            found = pickle.loads(content)
-        except Exception as error:
-            return Refused(f"state: cannot be read back: {error}")
-        return Refused(found) if isinstance(found, str) else Snapshot(*found)
+    @guarded
+    def _fmu_state_from_bytes(self, data: bytes) -> Snapshot:
+        header, values = read_header(data)
+        guid, phase, changed, layout = (header[key] for key in ("guid", "phase", "changed", "layout"))
+        if guid != self.guid:
+            raise Refused(f"state: of another FMU, with the GUID {guid}")
+        for name, value in changed.items():
+            self.ports.check_parameter(name, value)
+        bare = len(layout) <= 1  # the inputs alone: nothing was initialised
+        if phase not in (PHASES[1:2] if bare else PHASES[1:]) and (phase, bare) != (PHASES[0], True):
+            raise Refused(f"state: cannot be read back: it is {phase}, {'without' if bare else 'with'} the state of a unit")
+        unit = None if bare else self.unit if self.unit is not None and changed == self.changed else self._make_unit(changed)
+        inputs, state = rebuild((self.inputs, None if unit is None else unit.state), layout, values)
+        return Snapshot(guid, phase, header["time"], changed, inputs, state)
 
     # inside
 
@@ -263,26 +254,26 @@ class UnitSlave(Fmi2Slave):
         if self.unit is None:
             if self.phase == "not initialised":
                 raise Refused("outputs: not defined before initialisation")
-            unit = self._make_unit()
+            unit = self._make_unit(self.changed)
             message = self.ports.not_finite(self.inputs) or unit.initialize(self.time, self.ports.held(self.inputs))
             if message is not None:
                 raise Refused(message)
             self.unit = unit
         return self.unit
 
-    def _make_unit(self) -> Any:
-        changes = dict(self.changed)
+    def _make_unit(self, changed: Mapping[str, Any]) -> Any:
+        changes = dict(changed)
         text = changes.pop(CONFIGURATION, "")
         tree = schema.from_json(self.unit_class.PARAMETERS, text) if text else self.parameters
         tree = schema.override(tree, {self._fields[name]: value for name, value in changes.items()})
-        self._expect_outputs(self.unit_class.outputs(tree))
+        self._expect_outputs(self.unit_class.outputs(tree), changed)
         return self.unit_class(tree)
 
-    def _expect_outputs(self, given: PortTable) -> None:
+    def _expect_outputs(self, given: PortTable, changed: Mapping[str, Any]) -> None:
         """An energy that the FMU has no output for would be missing from the balance, unseen."""
         there = self.ports.outputs
         for name in {**there, **given}:
             if name not in there or name not in given or given[name][0] != there[name][0]:
-                cause = ", ".join(key for key, value in self.changed.items() if value != self.ports.parameters[key].value)
+                cause = ", ".join(key for key, value in changed.items() if value != self.ports.parameters[key].value)
                 verb = "changes" if name in there else "adds"
                 raise Refused(f"{cause}: {verb} the output {name}; such an FMU must be exported anew")

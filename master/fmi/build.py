@@ -34,9 +34,9 @@ from .document import icon_png, page_html
 from .portable import EPOCH
 
 HERE = Path(__file__).parent
-BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py", "server.py")
+BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py", "server.py", "state.py")
 LINUX = "binaries/linux64/"
-CAPABILITIES = {"needsExecutionTool": False, "canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
+CAPABILITIES = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ class Recipe:
     `package` is the folder of the unit package, `unit` the place of its class in it (``slave.PipeUnit``), `parameters`
     the nested mapping that becomes the defaults. Without a `description` the unit's own is taken. `experiment` may hold
     start_time, stop_time, step_size, tolerance; `inputs` the start values of inputs that do not start at zero. A `portable`
-    FMU brings its own Python and compiled kernels (see `portable`).
+    FMU brings its own Python and compiled kernels (see `portable`); any other needs a Python on the machine. `nominal` holds nominal values
+    by port, where they are not those of its unit of measure.
     """
 
     package: Path
@@ -58,6 +59,7 @@ class Recipe:
     experiment: Mapping[str, float] = field(default_factory=dict)
     inputs: Mapping[str, Sequence[float]] = field(default_factory=dict)
     portable: bool = False
+    nominal: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -72,7 +74,7 @@ class Recipe:
     @property
     def digest(self) -> str:
         """Hash of everything the FMU's content follows from."""
-        facts = {**_about(self), "parameters": self.parameters, "experiment": dict(self.experiment), "inputs": dict(self.inputs)}
+        facts = {"about": _about(self), **_content(self)}
         return _digest({"bundle": self.bundle, "facts": json.dumps(facts, sort_keys=True)})
 
 
@@ -87,14 +89,15 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
         script, configuration = Path(folder, f"{recipe.bundle}_entry.py"), Path(folder, "fmu.json")
         shutil.copy(HERE / "entry.py", script)
         about = {**_about(recipe), "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, recipe.digest))}
-        content = {"about": about, "parameters": recipe.parameters, "experiment": dict(recipe.experiment), "inputs": dict(recipe.inputs)}
+        content = {"about": about, **_content(recipe)}
         configuration.write_text(json.dumps(content, indent=1), encoding="utf-8")
         bundle = Path(folder, recipe.bundle)
         for name, text in _sources(recipe).items():
             target = bundle / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(text)
-        raw = FmuBuilder.build_FMU(script, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **CAPABILITIES)
+        capabilities = {**CAPABILITIES, "needsExecutionTool": not recipe.portable}
+        raw = FmuBuilder.build_FMU(script, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **capabilities)
         finished = destination.with_name(f".{os.getpid()}_{destination.name}")
         _finish(recipe, Path(raw), finished)
         finished.replace(destination)
@@ -112,7 +115,7 @@ def cache_folder(kind: str) -> Path:
 def cached_fmu(recipe: Recipe, folder: Path) -> Path:
     """The FMU of this recipe in `folder`, built if it is not there: ``folder/Pipe_<hash>.fmu``."""
     path = folder / f"{recipe.name}_{recipe.digest}.fmu"
-    return path if path.is_file() else build_fmu(recipe, path)
+    return path if zipfile.is_zipfile(path) else build_fmu(recipe, path)
 
 
 def compile_kernels(recipe: Recipe, fmu: Path) -> None:
@@ -148,6 +151,11 @@ def _about(recipe: Recipe) -> dict[str, str]:
     return about | ({"description": recipe.description} if recipe.description else {})
 
 
+def _content(recipe: Recipe) -> dict[str, Any]:
+    parts = {"experiment": recipe.experiment, "inputs": recipe.inputs, "nominal": recipe.nominal}
+    return {"parameters": recipe.parameters} | {name: dict(part) for name, part in parts.items()}
+
+
 def _sources(recipe: Recipe) -> dict[str, bytes]:
     """Files of the bundle by relative name: the unit package, the adapter, and the module that joins the two."""
     files = {
@@ -166,7 +174,7 @@ def _digest(parts: Mapping[str, str | bytes]) -> str:
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
     for source in ("entry.py", "runtime.py", "loader.c", "portable.py"):
         digest.update((HERE / source).read_bytes())
-    digest.update(sys.executable.encode())
+    digest.update(portable.interpreter().encode())
     for name, content in sorted(parts.items()):
         data = content.encode() if isinstance(content, str) else content
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
@@ -176,16 +184,18 @@ def _digest(parts: Mapping[str, str | bytes]) -> str:
 def _finish(recipe: Recipe, raw: Path, finished: Path) -> None:
     """Repack compressed, in fixed order and with fixed dates; add documentation, icon and loader, and to a portable FMU its Python."""
     with zipfile.ZipFile(raw) as source:
-        contents = {name: source.read(name) for name in source.namelist()}
+        foreign = [name for name in source.namelist() if name.startswith("binaries/") and not name.startswith(LINUX)]
+        contents = {name: source.read(name) for name in source.namelist() if name not in foreign}  # PythonFMU's, which find no Python
     model = ElementTree.fromstring(contents["modelDescription.xml"])
     about = recipe.package / "about.html"
     contents["documentation/index.html"] = page_html(model, about.read_text(encoding="utf-8") if about.is_file() else "").encode()
     contents["model.png"] = icon_png()
-    for name in (name for name in contents if name.startswith(LINUX)):  # Windows keeps PythonFMU's
+    for name in (name for name in contents if name.startswith(LINUX)):
         contents[name] = loader.library(cache_folder("loaders"))
     contents["resources/runtime.py"] = (HERE / "runtime.py").read_bytes()
+    contents |= licenses.entry(recipe.name, recipe.license, recipe.author)
     contents |= licenses.of_package("pipelay") | licenses.of_package("pythonfmu")
-    contents["resources/python.txt"] = sys.executable.encode()
+    contents["resources/python.txt"] = portable.interpreter().encode()
     if recipe.portable:
         if not (compiled := _kernels(recipe, contents)):
             place = cache_folder("units")

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 _DERIVED: dict[str, dict[str, float]] = {
@@ -39,6 +40,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     nominal: float | None = None
+    items: tuple[str, ...] = ()  # of an enumeration; `start` is a number from 1 on
 
 
 def scalar_names(name: str, size: int) -> list[str]:
@@ -71,6 +73,8 @@ def fill(root: Element, variables: Sequence[Variable]) -> None:
     units = sorted({variable.unit for variable in variables if variable.unit})
     if units:
         root.insert(1, _unit_definitions(units))  # the schema wants it straight after CoSimulation
+    if enumerations := [variable for variable in variables if variable.items]:
+        root.insert(2 if units else 1, _type_definitions(enumerations))
     table, structure = root.find("ModelVariables"), root.find("ModelStructure")
     assert table is not None
     assert structure is not None
@@ -91,6 +95,20 @@ def _unit_definitions(units: Iterable[str]) -> Element:
     return definitions
 
 
+def _type_definitions(enumerations: Iterable[Variable]) -> Element:
+    definitions = Element("TypeDefinitions")
+    for variable in enumerations:
+        table = SubElement(SubElement(definitions, "SimpleType", name=_type_name(variable)), "Enumeration")
+        for value, item in enumerate(variable.items, 1):
+            SubElement(table, "Item", name=item, value=str(value))
+    return definitions
+
+
+def _type_name(variable: Variable) -> str:
+    """Of the enumeration's type, which must not be the name of a variable."""
+    return f"{variable.name}.items"
+
+
 def _scalar_variable(variable: Variable, reference: int) -> Element:
     about = {"name": variable.name, "valueReference": str(reference), "causality": variable.causality}
     about["variability"] = _VARIABILITY[variable.causality]
@@ -99,8 +117,8 @@ def _scalar_variable(variable: Variable, reference: int) -> Element:
     if variable.doc:
         about["description"] = variable.doc
     element = Element("ScalarVariable", about)
-    details = {"start": variable.start, "min": variable.minimum, "max": variable.maximum, "nominal": variable.nominal}
-    details["unit"] = variable.unit or None
+    details: dict[str, Any] = {"start": variable.start, "min": variable.minimum, "max": variable.maximum, "nominal": variable.nominal}
+    details |= {"unit": variable.unit or None, "declaredType": _type_name(variable) if variable.items else None}
     SubElement(element, variable.kind, {key: _text(value) for key, value in details.items() if value is not None})
     return element
 

@@ -57,11 +57,13 @@ def _ports(model: Element, causality: str) -> list[list[str]]:
     """Rows (name, size, unit, default, meaning) of all variables of one causality; ``x[1]``.. share a row."""
     rows: dict[str, list[str]] = {}
     units: dict[str, dict[str, None]] = {}  # of a port's components, each once
+    items = {(kind.get("name"), item.get("value")): item.get("name", "") for kind in model.iter("SimpleType") for item in kind.iter("Item")}
     for variable in model.iterfind("ModelVariables/ScalarVariable"):
         if variable.get("causality") != causality:
             continue
         name = re.sub(r"\[\d+\]$", "", variable.get("name", ""))
         value = variable[0].get("start", "")
+        value = items.get((variable[0].get("declaredType"), value), value)
         units.setdefault(name, {})[variable[0].get("unit", "")] = None
         if name in rows:
             rows[name][1] = str(int(rows[name][1]) + 1)

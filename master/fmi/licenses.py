@@ -12,6 +12,16 @@ FOLDER = "documentation/licenses"
 _LICENSE = re.compile("licen[cs]e|copying|notice", re.IGNORECASE)
 
 
+def entry(model: str, license_name: str, author: str) -> dict[str, bytes]:
+    """The entry of the folder, ``license.txt``, as `of_package`."""
+    text = (
+        f"{model}: {license_name}, {author}.\n\n"
+        "The folders beside this file hold, each under its name, the licences of pipelay, whose code this FMU is,\n"
+        "and of what it carries of others: parts of PythonFMU and, in a portable FMU, Python, its packages and\nshared libraries.\n"
+    )
+    return {f"{FOLDER}/license.txt": text.encode()}
+
+
 def of_package(name: str) -> dict[str, bytes]:
     """Licence files of an installed Python package by their places in an FMU; none if it is not installed."""
     try:

@@ -45,14 +45,27 @@ _NOT_NEEDED = (
 )  # fmt: skip
 
 
+def interpreter() -> str:
+    """Path of this interpreter, one however it was spelled: without links, but for the one that leads out of a virtual environment."""
+    path = Path(sys.executable)
+    path = path.parent.resolve() / path.name
+    while path.is_symlink():
+        target = path.parent / path.readlink()
+        target = target.parent.resolve() / target.name
+        if sys.prefix != sys.base_prefix and target.parent != path.parent:
+            break
+        path = target
+    return str(path)
+
+
 def archive(folder: Path) -> Path:
     """Zip file of the runtime and its licences by their places in an FMU, kept in `folder`. Raises RunError on another platform."""
     if (platform.system(), platform.machine(), platform.libc_ver()[0]) != ("Linux", "x86_64", "glibc"):
         raise RunError(f"--portable: works on Linux x86-64 with glibc, this is {platform.platform()}")
     versions = [f"{name} {importlib.metadata.version(name)}" for name in PACKAGES]
-    facts = "\n".join([Path(__file__).read_text(encoding="utf-8"), sys.version, sys.executable, *versions])
+    facts = "\n".join([Path(__file__).read_text(encoding="utf-8"), sys.version, interpreter(), *versions])
     place = folder / f"python_{hashlib.sha256(facts.encode()).hexdigest()[:12]}.zip"
-    if not place.is_file():
+    if not zipfile.is_zipfile(place):
         with tempfile.TemporaryDirectory(dir=folder) as work:
             tree, packed = Path(work, "tree"), Path(work, "packed.zip")
             _collect(tree)

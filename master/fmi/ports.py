@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from .description import Variable, scalar_names
 from .schema import Parameter
 
 KINDS = ("Real", "Integer", "Boolean", "String")  # of FMI variables; ports are real
+_TYPES = dict(zip((*KINDS, "Enumeration"), (float, int, bool, str, str), strict=True))
+LONGEST_TEXT = 10_000_000  # characters; a table of all nodes takes a fifth of it
 PortTable = Mapping[str, tuple[int, str | Sequence[str], str]]  # name -> (size, unit or those of the components, description)
 Ranges = Mapping[str, tuple[float | None, float | None]]  # port -> least and largest value
 
@@ -66,9 +68,33 @@ class Ports:
             raise ValueError(f"value reference = {reference}: must be below {len(self._places)}")
         causality, name, _ = place = self._places[reference]
         own = self.parameters[name].kind if causality == "parameter" else "Real"
-        if kind != own:
+        if kind != ("Integer" if own == "Enumeration" else own):
             raise ValueError(f"{name}: asked for as {kind}, is {own}")
         return place
+
+    def check_parameter(self, name: str, value: Any) -> None:
+        """Raise ValueError where `value` cannot be that of the parameter `name`; its range is the unit's business."""
+        if name not in self.parameters or type(value) is not _TYPES[self.parameters[name].kind]:
+            raise ValueError(f"{name} = {value!r:.80}: must be a parameter, and a value of its type")
+        if (items := self.parameters[name].items) and value not in items:
+            raise ValueError(f"{name} = {value!r:.80}: must be one of {', '.join(map(repr, items))}")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{name} = {value}: must be finite")
+        if isinstance(value, str) and len(value) > LONGEST_TEXT:
+            raise ValueError(f"{name}: has {len(value)} characters, must have at most {LONGEST_TEXT}")
+
+    def as_item(self, name: str, value: Any) -> Any:
+        """What the host's `value` means: of an enumeration the name of the item with that number, else itself. Raises ValueError."""
+        items = self.parameters[name].items
+        if items and not 1 <= value <= len(items):
+            numbers = ", ".join(f"{i} ({item})" for i, item in enumerate(items, 1))
+            raise ValueError(f"{name} = {value}: must be one of {numbers}")
+        return items[value - 1] if items else value
+
+    def as_number(self, name: str, value: Any) -> Any:
+        """Inverse of `as_item`."""
+        items = self.parameters[name].items
+        return items.index(value) + 1 if items else value
 
     def runs(self, references: Sequence[int], kind: str = "Real") -> Iterator[Run]:
         """`references` of that kind in order, cut into runs that one port can answer at once. Raises ValueError as `place`."""
@@ -95,16 +121,17 @@ class Ports:
         return f"{name}[{i + 1}] = {inputs[bad]}: must be finite"
 
     def variables(self, ranges: Ranges, nominal: Mapping[str, float]) -> list[Variable]:
-        """Scalar variables for the model description, in the order of their value references; `nominal` values by unit of measure."""
+        """Scalar variables for the model description, by value reference; `nominal` values by port or unit of measure."""
         ports, table = self.inputs | self.outputs, []
         for reference, (causality, name, i) in enumerate(self._places):
             if causality == "parameter":
                 it = self.parameters[name]
-                table.append(Variable(name, causality, it.kind, it.unit, it.doc, it.value, it.minimum, it.maximum))
+                value = self.as_number(name, it.value)
+                table.append(Variable(name, causality, it.kind, it.unit, it.doc, value, it.minimum, it.maximum, items=it.items))
                 continue
             size, units, doc = ports[name]
             unit = units if isinstance(units, str) else units[i]
             start = float(self.start[reference]) if causality == "input" else None
-            bounds = ranges.get(name, (None, None))
-            table.append(Variable(scalar_names(name, size)[i], causality, "Real", unit, doc, start, *bounds, nominal.get(unit)))
+            bounds, size_of = ranges.get(name, (None, None)), nominal.get(name, nominal.get(unit))
+            table.append(Variable(scalar_names(name, size)[i], causality, "Real", unit, doc, start, *bounds, size_of))
         return table

@@ -49,6 +49,7 @@ def serve(descriptor):  # type: ignore[no-untyped-def]
             answers.flush()
 
         resources = os.path.dirname(os.path.abspath(__file__))
+        os.environ.pop("NUMBA_DISABLE_JIT", None)  # meant for the host's own code
         try:
             choose_processor(resources)
             answer = load(resources)

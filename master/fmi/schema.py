@@ -1,7 +1,7 @@
 """Parameters of a unit as three equal forms: frozen dataclass tree, nested mapping (TOML, JSON), flat list (FMI).
 
 Part of every exported FMU, so this module imports the standard library only. Field types understood: float, int,
-bool, str, Literal, fixed tuples of numbers, tuple[X, ...], a nested dataclass, and ``X | None`` of any of them
+bool, str, Literal (of texts: an enumeration), fixed tuples of numbers, tuple[X, ...], a nested dataclass, and ``X | None`` of any of them
 (None = absent). Field metadata: ``unit`` (or one each for a fixed tuple), ``doc``, ``min``/``max`` and the strict
 ``above``/``below``; ranges are the dataclass's own business (``__post_init__`` raises ``ValueError("key = value: rule")``), here
 the path is put before it.
@@ -25,7 +25,7 @@ _RULES = {float: "must be a number", int: "must be an integer", bool: "must be t
 
 @dataclass(frozen=True)
 class Parameter:
-    """One scalar FMI parameter: its FMI type, value and what the field says about it."""
+    """One scalar FMI parameter: its FMI type, value (of an enumeration the item's name) and what the field says about it."""
 
     kind: str
     value: float | int | bool | str
@@ -33,6 +33,7 @@ class Parameter:
     minimum: float | None = None
     maximum: float | None = None
     doc: str = ""
+    items: tuple[str, ...] = ()  # of an enumeration
 
 
 def build(cls: type[T], mapping: Mapping[str, Any], path: str = "") -> T:
@@ -162,6 +163,8 @@ def _flatten(tree: Any, path: str, flat: dict[str, Parameter]) -> None:
                 flat[name] = Parameter("String", text, doc=f"{about.get('doc', '')} (JSON)".strip())
             else:
                 flat.update({f"{name}[{i + 1}]": _parameter(item, about, i) for i, item in enumerate(value)})
+        elif items := _items(hints[field.name]):
+            flat[name] = Parameter("Enumeration", value, doc=about.get("doc", ""), items=items)
         else:
             flat[name] = _parameter(value, about)
 
@@ -175,6 +178,13 @@ def _parameter(value: Any, about: Mapping[str, Any], place: int = 0) -> Paramete
     units = about.get("unit", "") if kind == "Real" else ""  # FMI gives units to reals only
     unit = units if isinstance(units, str) else units[place]
     return Parameter(kind, value, unit, lowest, highest, about.get("doc", ""))
+
+
+def _items(hint: Any) -> tuple[str, ...]:
+    """The texts that a Literal, or one that may be absent, allows."""
+    if get_origin(hint) in (Union, types.UnionType):
+        return next((items for argument in get_args(hint) if (items := _items(argument))), ())
+    return get_args(hint) if get_origin(hint) is Literal and all(isinstance(item, str) for item in get_args(hint)) else ()
 
 
 def _any_length(hint: Any) -> bool:

@@ -146,14 +146,11 @@ class Server:
 
     @staticmethod
     def _state_bytes(slot: _Slot, data: memoryview) -> bytes:
-        return bytes(slot.slave._fmu_state_to_bytes(_state(slot, data)))
+        return slot.slave._fmu_state_to_bytes(_state(slot, data))
 
     @staticmethod
     def _read_state(slot: _Slot, data: memoryview) -> None:
-        state = slot.slave._fmu_state_from_bytes(bytes(data[8:]))
-        if isinstance(state, Refused):
-            raise state
-        slot.states[_number(data)] = state
+        slot.states[_number(data)] = slot.slave._fmu_state_from_bytes(bytes(data[8:]))
 
 
 class _DiscardedError(Exception):

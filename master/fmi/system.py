@@ -22,6 +22,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from .description import base_unit, scalar_names
 
 SSD, SSC = "http://ssp-standard.org/SSP1/SystemStructureDescription", "http://ssp-standard.org/SSP1/SystemStructureCommon"
+OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 OSP_SYSTEM = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 OSP_MODEL = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
 ECCO_BOND = 0  # surge, where the vessel's positioning moves the pipe
@@ -73,7 +74,7 @@ EXPORTED = (*(f"{name}.fmu" for name in PORTS), SSP, OSP, OSP_ECCO, *OSP_MODELS.
 
 def write_system(fmus: Mapping[str, Path], folder: Path, macro_step: float, duration: float) -> list[Path]:
     """system.ssp, the two OSP structures and the models' port descriptions for the FMUs `pipe` and `vessel`; step and end in s."""
-    structure = structure_description(duration)
+    structure = structure_description(macro_step, duration)
     files = {
         OSP: osp_structure(fmus, macro_step),
         OSP_ECCO: osp_structure(fmus, macro_step, ECCO_BOND),
@@ -90,11 +91,14 @@ def write_system(fmus: Mapping[str, Path], folder: Path, macro_step: float, dura
     return written
 
 
-def structure_description(duration: float) -> Element:
-    """SystemStructure.ssd: both FMUs and plain connections; parameters and all other inputs keep the FMUs' start values."""
+def structure_description(macro_step: float, duration: float) -> Element:
+    """SystemStructure.ssd: both FMUs and plain connections; parameters and all other inputs keep the FMUs' start values.
+
+    The step stands in an annotation: SSP 1.0 has no place for it, and OMSimulator takes the system for one without co-simulation otherwise.
+    """
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     about = {"version": "1.0", "name": "pipelay", "generationTool": "pipelay", "generationDateAndTime": now}
-    root = Element("ssd:SystemStructureDescription", {"xmlns:ssd": SSD, "xmlns:ssc": SSC, **about})
+    root = Element("ssd:SystemStructureDescription", {"xmlns:ssd": SSD, "xmlns:ssc": SSC, "xmlns:oms": OMS, **about})
     system = SubElement(root, "ssd:System", name="pipelay")
     elements = SubElement(system, "ssd:Elements")
     for name in PORTS:
@@ -111,6 +115,10 @@ def structure_description(duration: float) -> Element:
         for start, end in _scalars(wire):
             ends = {"startElement": wire.source, "startConnector": start, "endElement": wire.target, "endConnector": end}
             SubElement(connections, "ssd:Connection", ends)
+    annotation = SubElement(SubElement(system, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
+    information = SubElement(SubElement(annotation, "oms:Annotations"), "oms:SimulationInformation")
+    tolerances = {"absoluteTolerance": "0.0001", "relativeTolerance": "0.0001"}  # of no effect with fixed steps
+    SubElement(information, "oms:FixedStepMaster", {"description": "oms-ma", "stepSize": repr(macro_step), **tolerances})
     SubElement(root, "ssd:DefaultExperiment", startTime="0", stopTime=repr(duration))
     return root
 

@@ -56,7 +56,7 @@ class SpringUnit:
         self.p = parameters
         self.remark = ""
         self.k = np.array([parameters.stiffness] * 3 + [parameters.turning] * 3)
-        self.state: State
+        self.state = State(np.zeros(6), np.zeros(6), np.zeros(6), np.zeros((6, 6)), 0.0, 0.0)
 
     def initialize(self, time: float, inputs: dict[str, np.ndarray]) -> str | None:
         x = np.array([*self.p.offset, 0.0, 0.0, 0.0])

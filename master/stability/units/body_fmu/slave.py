@@ -88,11 +88,14 @@ class BodyUnit:
         self.m = np.array([parameters.mass] * 3 + [parameters.inertia] * 3)
         self.load = np.array([*parameters.load, *parameters.holding_moment])
         self.shaking = np.array([*parameters.shaking_force, *parameters.shaking_moment])
-        self.state: State
+        self.state = self._start()
+
+    def _start(self) -> State:
+        v = np.array([*self.p.start_velocity, *self.p.start_rotation])
+        return State(np.zeros(6), np.array(self.p.start_quaternion), v, v, 0.0, 0.0, 0.0, 0.0)
 
     def initialize(self, time: float, inputs: dict[str, np.ndarray]) -> str | None:
-        v = np.array([*self.p.start_velocity, *self.p.start_rotation])
-        self.state = State(np.zeros(6), np.array(self.p.start_quaternion), v, v, 0.0, 0.0, 0.0, 0.0)
+        self.state = self._start()
         return None
 
     def step(self, time: float, h: float, inputs: dict[str, np.ndarray]) -> str | None:

@@ -114,6 +114,7 @@ class MassUnit(_Linear):
         self.A = np.array([[0.0, 1.0], [-p.stiffness / p.mass, -p.damping / p.mass]])
         self.b, self.Q = np.array([0.0, 1.0 / p.mass]), np.diag([0.0, p.damping, 0.0])
         self.answer = np.array([0.0, 1.0, 0.0])
+        self.initialize(0.0, {})
 
     def initialize(self, time: float, inputs: dict[str, np.ndarray]) -> str | None:
         self._start([self.p.start_position - self.p.support, self.p.start_velocity])
@@ -170,6 +171,7 @@ class SpringUnit(_Linear):
         self.b = np.array([1.0, 0.0, pull[3]])
         slip = np.array([0.0, 0.0, -1.0, 1.0])
         self.Q = c * np.outer(slip, slip) + C * np.diag([0.0, 0.0, 1.0, 0.0])
+        self.initialize(0.0, {})
 
     def initialize(self, time: float, inputs: dict[str, np.ndarray]) -> str | None:
         p = self.p

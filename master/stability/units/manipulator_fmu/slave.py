@@ -6,7 +6,7 @@ The held mean is the only coupling error: work of the bond is mean force x chang
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -68,10 +68,14 @@ class ArmUnit:
         }
 
     def __init__(self, parameters: Manipulator) -> None:
-        self.state: Any = None
+        self.state = self._start()
+
+    @staticmethod
+    def _start() -> ArmState:
+        return ArmState(np.array([*ANGLES, 0.0, 0.0]), 0.0, 0.0, 0.0)
 
     def initialize(self, time: float, inputs: dict[str, np.ndarray]) -> str | None:
-        self.state = ArmState(np.array([*ANGLES, 0.0, 0.0]), 0.0, 0.0, 0.0)
+        self.state = self._start()
         return None
 
     def step(self, time: float, h: float, inputs: dict[str, np.ndarray]) -> str | None:
@@ -120,12 +124,12 @@ class CylinderUnit:
         }
 
     def __init__(self, parameters: Manipulator) -> None:
-        self.state: Any = None
-        self._rest = 0.0
+        pressure, self._rest = equilibrium()
+        self._start = CylinderState(pressure, START_LENGTH, 0.0, PISTON * (pressure[1] - pressure[0]), 0.0)
+        self.state = self._start
 
     def initialize(self, time: float, inputs: dict[str, np.ndarray]) -> str | None:
-        pressure, self._rest = equilibrium()
-        self.state = CylinderState(pressure, START_LENGTH, 0.0, PISTON * (pressure[1] - pressure[0]), 0.0)
+        self.state = self._start
         return None
 
     def step(self, time: float, h: float, inputs: dict[str, np.ndarray]) -> str | None:
