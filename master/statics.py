@@ -77,8 +77,9 @@ def released(scene: Scene, at: Prepared) -> Prepared:
 def report(scene: Scene) -> dict[str, Any]:
     """What `pipelay statics --json` prints; forces and moments act on the pipe, in e.
 
-    The touchdown is the arc length at which the centreline, linear between the nodes, last rises through z = -d/8 of the pipe's diameter d
-    over its coating; 0 where no node lies lower. The lowest point is that of the nodes. Round-off against the norm of its vector is 0.
+    The touchdown is the arc length at which the centreline, linear between the nodes, last rises through z = -d/8 of the diameter d over
+    the coating of the section there; 0 where none lies lower. The lowest point is that of the nodes. Round-off against the norm of its
+    vector is 0.
     """
     at = equilibrium(scene)
     pipe, found = Pipe(at.pipe), at.found
@@ -86,7 +87,7 @@ def report(scene: Scene) -> dict[str, Any]:
     forces = pipe.section_forces(state)
     touchdown = None
     if at.pipe.seabed is not None:
-        touchdown = _touchdown(pipe.s, found.position[:, 2] + 0.125 * pipe.line.diameter[0])
+        touchdown = _touchdown(pipe.s, found.position[:, 2], 0.125 * pipe.line.diameter)
     top, foot = _without_noise(found.top), _without_noise(found.foot)
     return {
         "top_force_e_N": top[:3].tolist(),
@@ -96,7 +97,7 @@ def report(scene: Scene) -> dict[str, Any]:
         "top_tension_N": float(forces.tension[-1]),
         "stretch_m": pipe.stretched_length(state) - at.pipe.length,
         "largest_bending_moment_N_m": float(pipe.largest_bending_moment(forces)),
-        "lowest_point_m": float(found.position[:, 2].max()),
+        "lowest_point_m": float(found.position[:, 2].max()) + 0.0,
         "touchdown_s_m": touchdown,
         "stable": bool(found.stable),
         "vessel_position_m": None if at.vessel is None else _without_noise(at.vessel.start.position).tolist(),
@@ -224,13 +225,15 @@ def _rotation(quaternion: np.ndarray) -> Rotation:
     return Rotation.from_quat(np.roll(np.asarray(quaternion), -1))
 
 
-def _touchdown(s: np.ndarray, depth: np.ndarray) -> float:
-    """Arc length where `depth` (n,), linear over `s` (n,), last falls through 0; 0 where it is never above."""
-    lying = np.flatnonzero(depth > 0.0)
-    last = int(lying[-1]) if lying.size else 0
-    if not lying.size or last == len(s) - 1:
-        return float(s[last])
-    return float(s[last] + (s[last + 1] - s[last]) * depth[last] / (depth[last] - depth[last + 1]))
+def _touchdown(s: np.ndarray, z: np.ndarray, reach: np.ndarray) -> float:
+    """Arc length where the depth `z` (n,), linear over `s` (n,), last falls through -`reach` (n - 1,) of its element; 0 if nowhere."""
+    lower, upper = z[:-1] + reach, z[1:] + reach
+    lying = np.flatnonzero((lower > 0.0) | (upper > 0.0))
+    if not lying.size:
+        return 0.0
+    e = int(lying[-1])
+    part = lower[e] / (lower[e] - upper[e]) if upper[e] <= 0.0 else 1.0
+    return float(s[e] + part * (s[e + 1] - s[e]))
 
 
 def _without_noise(vector: ArrayLike) -> np.ndarray:

@@ -72,6 +72,15 @@ def test_sections_have_from_the_common_section_what_they_do_not_say_themselves()
     assert (lower.length, upper.length) == (300.0, 900.0)
 
 
+def test_the_touchdown_is_that_of_the_section_that_lifts_off():
+    """A thick first section lies higher on the bed than the pipe that leaves it at z = -d / 8."""
+    thick = "{length=20, outer_diameter=1.2, wall_thickness=0.06}"
+    found = report(scene.load("heave", ["pipe.seabed={}", f"pipe.sections=[{thick}, {{length=1180}}]", "start.x=780", "pipe.nodes=96"]))
+    s, z = np.array(found["s_m"]), np.array(found["position_e_m"])[:, 2]
+    assert found["touchdown_s_m"] > 20.0
+    assert np.interp(found["touchdown_s_m"], s, z) == pytest.approx(-0.125 * 0.4064, rel=1e-9)
+
+
 def test_the_report_has_the_bending_between_nodes_the_touchdown_between_nodes_and_no_round_off():
     found = report(scene.load("pipelay", ["start.x=780"]))
     assert found["largest_bending_moment_N_m"] >= max(found["bending_moment_N_m"])
