@@ -24,7 +24,7 @@ class StepResult(NamedTuple):
     top: Array  # (6,) mean force and moment on the pipe at its top [N, N m], e
     impedance: Array  # (6, 6) d top / d (mean velocity, mean angular velocity)
     iterations: int
-    residual: float  # over the largest element force and 3e-4 of the inertial terms
+    residual: float  # over the largest element force and 1e-3 of the inertial terms
     flaw: str = ""  # what an element would be in the new state, for which the step is refused; else empty
 
 

@@ -87,7 +87,7 @@ class PipeUnit:
             "largest_bending_moment": (1, "N.m", "largest bending moment, between the nodes too"),
             "largest_von_mises": (1, "Pa", "largest von Mises stress in the wall, between the nodes too"),
             "newton_iterations": (1, "1", "corrections of the last step"),
-            "newton_residual": (1, "1", "residual of the last step over the largest element force and 3e-4 of the inertial ones"),
+            "newton_residual": (1, "1", "residual of the last step over the largest element force and 1e-3 of the inertial ones"),
             "s": (n, "m", "arc length of the nodes"),
             "node_position": (3 * n, "m", "positions of the nodes, in e"),
             "node_tension": (n, "N", "effective tension at the nodes, without numerical damping"),

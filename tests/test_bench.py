@@ -66,11 +66,14 @@ def test_a_race_compares_with_the_cheapest_of_ours_that_is_as_good_and_a_lost_on
 
 
 def test_a_step_longer_than_the_time_between_instants_is_interpolated():
-    """A curve through the ends of steps of 0.8 s against steps of 0.4 s: no worse than twice the time rule's own fourfold error."""
+    """A curve through the ends of steps of 0.8 s against steps of 0.4 s: no worse than twice the time rule's own fourfold error.
+
+    For the bending moment than the curve's sixteenfold, its fourth order, which is larger than the time rule's.
+    """
     case = replace(QUICK, duration=24.0)
     exact = line._run(case, FINE)[1]
     short, long = (line._run(case, Setting(line.OWN, 16, h, "adapted"))[1].distance(exact) for h in (0.4, 0.8))
-    assert np.all(np.array(long) < 8.0 * np.array(short))
+    assert np.all(np.array(long) < np.array([8.0, 8.0, 16.0]) * np.array(short))
 
 
 def rest():

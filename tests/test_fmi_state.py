@@ -157,10 +157,10 @@ def test_many_lives_of_an_instance_hold_memory(small, exported, unit):
         return sys.getallocatedblocks(), resident()
 
     live()  # tables and arenas take their size, with room for what the host's own garbage is between two collections
-    blocks, memory = live()
-    more_blocks, more_memory = live()
-    assert more_blocks - blocks < LIVES * 4
-    assert more_memory - memory < LIVES * 8e3  # bytes
+    rounds = np.array([live() for _ in range(4)])
+    blocks, memory = np.diff(rounds, axis=0).min(axis=0)  # a leak shows in every round, an arena more of the process in one
+    assert blocks < LIVES * 4
+    assert memory < LIVES * 8e3  # bytes
 
 
 @pytest.mark.parametrize("unit", UNITS)

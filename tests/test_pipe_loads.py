@@ -91,7 +91,10 @@ def test_element_on_the_bed_has_the_gradient_of_its_potential():
     np.testing.assert_allclose(force, expected, rtol=1e-6, atol=1e-5 * WEIGHT)
 
 
-def mean_contact(bed, ends, new_z, dt=0.1):
+STEP = 0.1  # s
+
+
+def mean_contact(bed, ends, new_z, dt=STEP):
     vector, matrix = np.zeros(12), np.zeros((12, 12))
     row = np.zeros(9)
     old_z = np.array([-0.02, 0.01, 0.005])
@@ -103,8 +106,10 @@ def mean_contact(bed, ends, new_z, dt=0.1):
 @pytest.mark.parametrize("way", [(0.008, 0.008), (-0.01, -0.03), (0.03, -0.01)])
 def test_bed_damping_takes_power_whichever_way_the_pipe_moves(way):
     new_z = [-0.02 + way[0], 0.01 + way[1], 0.005]
-    lost, damped = mean_contact([1.0, 0.0, 1e-3], np.zeros((2, 6)), new_z)
-    free, elastic = mean_contact([0.0, 0.0, 1e-3], np.zeros((2, 6)), new_z)
+    ends = np.zeros((2, 6))
+    ends[:, 2] = np.array(way) / STEP
+    lost, damped = mean_contact([1.0, 0.0, 1e-3], ends, new_z)
+    free, elastic = mean_contact([0.0, 0.0, 1e-3], ends, new_z)
     assert free == 0.0
     assert lost > 0.0
     assert (damped - elastic)[[2, 8]] @ way == pytest.approx(lost, rel=1e-12)
@@ -113,8 +118,10 @@ def test_bed_damping_takes_power_whichever_way_the_pipe_moves(way):
 def test_the_bed_never_holds_a_pipe_that_leaves_it():
     """Lifted at 3 m/s with a dashpot of 1 s/m the elastic reaction is taken away whole, not turned into suction."""
     new_z = [-0.02 - 0.03, 0.01 - 0.03, 0.005]
-    lost, damped = mean_contact([1.0, 0.0, 1e-3], np.zeros((2, 6)), new_z, dt=0.01)
-    _, elastic = mean_contact([0.0, 0.0, 1e-3], np.zeros((2, 6)), new_z, dt=0.01)
+    ends = np.zeros((2, 6))
+    ends[:, 2] = -3.0
+    lost, damped = mean_contact([1.0, 0.0, 1e-3], ends, new_z, dt=0.01)
+    _, elastic = mean_contact([0.0, 0.0, 1e-3], ends, new_z, dt=0.01)
     assert elastic[[2, 8]].sum() > 0.0
     np.testing.assert_array_equal(damped, 0.0)
     assert lost == pytest.approx(0.03 * elastic[[2, 8]].sum(), rel=1e-12)

@@ -10,11 +10,12 @@ from pipe_helpers import pitch, rotation, started
 from statics_grid import equilibrium, scenes
 
 SCENES = scenes()
+NODES = {192: 64}  # a hose that bends within 0.3 m: on 48 nodes, 200 m apart, its turned top is led to no shape at rest
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=[scene.name for scene in SCENES])
 def test_a_line_finds_a_stable_equilibrium_with_its_top_hanging_and_turned(scene):
-    pipe, hung, held = equilibrium(scene)
+    pipe, hung, held = equilibrium(scene, NODES.get(SCENES.index(scene), 48))
     assert hung.converged
     assert hung.stable
     assert held.converged
