@@ -114,14 +114,13 @@ def _placed(parameters: PipeParameters, s: Array) -> PipeParameters:
 def _line(parameters: PipeParameters, s: Array) -> Line:
     """Element and node data on the nodes `s` (n,)."""
     h = np.diff(s)
-    gravity, density = parameters.environment.gravity, parameters.environment.water_density
+    density = parameters.environment.water_density
     section = _picker(parameters, s)
     stiffness = section(lambda one: one.stiffness)
     k2, p2 = shear_stiffness(stiffness[:, 1], stiffness[:, 4], h)
     k3, p3 = shear_stiffness(stiffness[:, 1], stiffness[:, 3], h)
     carried = mass_per_length(parameters, s)
     mass = carried.along
-    displaced = section(lambda one: density * one.outer_area)
     diameter = section(lambda one: one.hydrodynamic_diameter)
     added = np.zeros((0, 3))
     if parameters.added_mass is not None:
@@ -134,7 +133,7 @@ def _line(parameters: PipeParameters, s: Array) -> Line:
         length=h,
         stiffness=np.column_stack([stiffness[:, 0], k2, k3, stiffness[:, 2:]]),
         share=np.column_stack([p2, p3]),
-        weight=(mass - displaced) * gravity,
+        weight=section(parameters.weight),
         bearing=_by_section(parameters, s, np.array(parameters.bearing())),
         drag=0.5 * density * diameter[:, None] * section(lambda one: (one.drag_tangential, one.drag_normal)),
         diameter=diameter,
