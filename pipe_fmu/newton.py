@@ -199,7 +199,8 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             return True, iteration, size
         lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
         stalled = max(size, previous) <= TOLERANCE + floor / force_scale and size > 0.3 * previous and share == 1.0
-        settled = not lost and gap == 0.0 and (size <= TOLERANCE or stalled)
+        guessed = iteration == 0 and not prescribed  # a guess knows nothing of the relation between the top's increment and the force
+        settled = not (lost or guessed) and gap == 0.0 and (size <= TOLERANCE or stalled)
         made = _made(ours, old, x, residual, force, works) if settled else math.inf
         done = made <= 1.0
         if done and iteration > 0:

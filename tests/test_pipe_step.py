@@ -334,6 +334,21 @@ def test_a_top_that_yields_meets_the_law_of_what_holds_it_and_feels_the_force_of
     np.testing.assert_allclose(met.top, told.top, rtol=0.0, atol=1e-9 * np.abs(told.top).max())
 
 
+@pytest.mark.parametrize(("speed", "h"), [(0.2, 0.1), (0.2, 1e-5), (20.0, 1e-6), (2e-3, 1e-7)])
+@pytest.mark.parametrize("mass", [1e2, 1e7])
+def test_a_top_that_yields_leaves_a_line_at_rest_by_that_law_too(mass, speed, h):
+    """The guess, rest, balances the pipe, but knows nothing of what the top is told."""
+    pipe, _, start = started(scene("current", environment=sea(800.0, 0.0)))
+    mobility = 0.5 * h / mass * np.diag([1.0] * 3 + [0.1] * 3)
+    pull = pipe.step(start, np.zeros(3), np.zeros(3), h).top
+    free = speed * np.array([1.0, 0.0, -0.5, 0.0, 0.05, 0.0]) + mobility @ pull
+    met = pipe.step(start, free[:3], free[3:], h, mobility)
+    assert met.converged
+    velocity = met.state.last[-1]
+    np.testing.assert_allclose(velocity, free - mobility @ met.top, rtol=0.0, atol=1e-9 * np.abs(free).max())
+    assert np.abs(velocity).max() > 0.0
+
+
 @pytest.mark.parametrize("size", [1e-4, 0.05])
 @pytest.mark.parametrize("name", ["current", "everything"])
 def test_residual_is_the_same_with_and_without_its_tangent(name, size):
