@@ -1,6 +1,8 @@
 """How the ends are held: the foot, eq. (33), and the top, each clamped or pinned, imposed on residual and tangent; and the pipe as its top
 feels it."""
 
+import math
+
 import numpy as np
 
 from .block_tridiagonal import SIZE, lu, lu_solve, lu_solve_vector
@@ -16,8 +18,27 @@ def axis_of_foot(quaternion):
 
 
 @inner
-def hold_foot(line, quaternion, diagonal, upper):
-    """Impose the foot on the tangent: clamped, or pinned (position held, no spin about t1, so that the line's twist is determined)."""
+def hold_foot(line, quaternion, vector):
+    """Take from `vector` (6,) of the foot what it may not do, or from its residual what holds it.
+
+    A guess and a correction move it by round-off, which the reaction of a very short step makes work of.
+    """
+    for k in range(SIZE if line.foot_clamped else 3):
+        vector[k] = 0.0
+    if line.foot_clamped:
+        return
+    axis = axis_of_foot(quaternion)
+    along = dot((vector[3], vector[4], vector[5]), axis)
+    for i in range(3):
+        vector[3 + i] -= along * axis[i]
+
+
+@inner
+def hold_foot_tangent(line, quaternion, diagonal, upper):
+    """Impose the foot on the tangent: clamped, or pinned (position held, no spin about t1, so that the line's twist is determined).
+
+    The spin about t1 is held by a stiffness as large as those beside it: against a smaller one their round-off moves it.
+    """
     block, coupling = diagonal[0], upper[0]
     for i in range(SIZE if line.foot_clamped else 3):
         for j in range(SIZE):
@@ -26,7 +47,7 @@ def hold_foot(line, quaternion, diagonal, upper):
     if line.foot_clamped:
         return
     axis = axis_of_foot(quaternion)
-    stiffness = line.stiffness[0, 3] / line.length[0]
+    stiffness = max(math.fabs(block[3, 3]), math.fabs(block[4, 4]), math.fabs(block[5, 5]))
     for j in range(SIZE):
         along = block[3, j] * axis[0] + block[4, j] * axis[1] + block[5, j] * axis[2]
         across = coupling[3, j] * axis[0] + coupling[4, j] * axis[1] + coupling[5, j] * axis[2]
@@ -35,21 +56,6 @@ def hold_foot(line, quaternion, diagonal, upper):
             coupling[3 + i, j] -= axis[i] * across
             if j >= 3:
                 block[3 + i, j] += stiffness * axis[i] * axis[j - 3]
-
-
-@inner
-def hold_foot_residual(line, quaternion, theta, residual):
-    """Impose the foot on the residual; `theta` its trial rotation."""
-    for i in range(SIZE if line.foot_clamped else 3):
-        residual[0, i] = 0.0
-    if line.foot_clamped:
-        return
-    axis = axis_of_foot(quaternion)
-    stiffness = line.stiffness[0, 3] / line.length[0]
-    along = dot((residual[0, 3], residual[0, 4], residual[0, 5]), axis)
-    turned = dot(theta, axis)
-    for i in range(3):
-        residual[0, 3 + i] += axis[i] * (stiffness * turned - along)
 
 
 @kernel

@@ -8,10 +8,9 @@ from .block_tridiagonal import SIZE, condense, factorize, substitute
 from .columns import line_columns, take
 from .compiled import inner, kernel
 from .element import STRAINS
-from .ends import axis_of_foot, condense_top, hold_foot, top_correction, yielding
+from .ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
 from .lanes import larger
 from .node_kernel import advance
-from .so3 import dot
 from .state import PipeState
 from .step_kernel import assemble, old_columns
 
@@ -117,7 +116,7 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful
         for k in range(SIZE):
             guess = weights[0] * state.last[i, k] + weights[1] * state.before[i, k] + weights[2] * state.earlier[i, k]
             x[i, k] = h * guess
-    _hold(line, state.quaternion, x[0])
+    hold_foot(line, state.quaternion, x[0])
     force, tangent = np.empty(SIZE), np.zeros((SIZE, SIZE))
     system = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n, SIZE))
     scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE), np.empty((n, SIZE))
@@ -191,7 +190,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             wanted[i] = top[i] - x[n - 1, i]
             if prescribed and (line.top_clamped or i < 3):
                 gap = max(gap, math.fabs(wanted[i]))
-        _hold(line, quaternion, residual[0])
+        hold_foot(line, quaternion, residual[0])
         floor = ROUND_OFF * force_scale + round_off
         force_scale, moment_scale = force_scale + INERTIAL * inertial_force, moment_scale + INERTIAL * inertial_moment
         size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
@@ -221,7 +220,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
         if lost or iteration == limit:
             break
         if fresh:
-            hold_foot(line, quaternion, diagonal, upper)
+            hold_foot_tangent(line, quaternion, diagonal, upper)
             if not line.foot_clamped:
                 diagonal[0, 3:, :3] = 0.0  # times no displacement; beside them a held row is no pivot, and moves by round-off
             if not factorize(diagonal, lower, upper):
@@ -242,28 +241,12 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             break
         substitute(diagonal, upper, residual, move, correction)
         _move(x, 1.0, correction)
-        _hold(line, quaternion, x[0])
+        hold_foot(line, quaternion, x[0])
         for i in range(SIZE):
             if prescribed and (line.top_clamped or i < 3):
                 x[n - 1, i] = top[i]
         previous = size
     return False, limit, size
-
-
-@inner
-def _hold(line, quaternion, move):
-    """Take from `move` (6,) of the foot what it may not do, or from its residual what holds it.
-
-    A guess and a correction move it by round-off, which the reaction of a very short step makes work of.
-    """
-    for k in range(SIZE if line.foot_clamped else 3):
-        move[k] = 0.0
-    if line.foot_clamped:
-        return
-    axis = axis_of_foot(quaternion)
-    along = dot((move[3], move[4], move[5]), axis)
-    for i in range(3):
-        move[3 + i] -= along * axis[i]
 
 
 @inner

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .block_tridiagonal import condense, factorize, substitute
 from .compiled import kernel
-from .ends import condense_top, hold_foot, hold_foot_residual, top_correction
+from .ends import condense_top, hold_foot, hold_foot_tangent, top_correction
 from .line import Array, Line, Water
 from .so3 import exp, multiply, normalize
 from .stability import positive
@@ -85,7 +85,7 @@ class Balance:
 
     def hold(self, vector: Array) -> None:
         """Strike what acts on the held ends from forces (n, 6)."""
-        hold_foot_residual(self.line, self.pose[1], (0.0, 0.0, 0.0), vector)
+        hold_foot(self.line, self.pose[1], vector[0])
         vector[-1, : 6 if self.line.top_clamped else 3] = 0.0
 
     def flaw(self) -> str:
@@ -141,7 +141,7 @@ class Factors:
         self.diagonal, self.lower, self.upper = (block.copy() for block in balance.tangent)
         if damping > 0.0:
             self.diagonal[:, range(6), range(6)] += damping * balance.scales.metric
-        hold_foot(self.line, balance.pose[1], self.diagonal, self.upper)
+        hold_foot_tangent(self.line, balance.pose[1], self.diagonal, self.upper)
         self.regular = bool(factorize(self.diagonal, self.lower, self.upper))
 
     def correction(self, residual: Array) -> Array:

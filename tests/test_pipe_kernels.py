@@ -38,13 +38,19 @@ def test_tangent_of_the_held_foot_is_the_derivative_of_its_residual(clamped):
     quaternion = np.tile(np.array([0.8, 0.2, -0.4, 0.4]), (3, 1))
     diagonal, upper, x = random.normal(size=(3, 6, 6)), random.normal(size=(2, 6, 6)), random.normal(size=(3, 6))
     residual = np.zeros((3, 6))
+    ends.hold_foot(line, quaternion, x[0])
     residual[0] = diagonal[0] @ x[0] + upper[0] @ x[1]
-    ends.hold_foot(line, quaternion, diagonal, upper)
-    ends.hold_foot_residual(line, quaternion, tuple(x[0, 3:]), residual)
+    ends.hold_foot(line, quaternion, residual[0])
+    ends.hold_foot_tangent(line, quaternion, diagonal, upper)
     held = 6 if clamped else 3
     np.testing.assert_allclose((diagonal[0] @ x[0] + upper[0] @ x[1])[held:], residual[0, held:], rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(diagonal[0, :held], np.eye(6)[:held])
+    assert not x[0, :held].any()
     assert not residual[0, :held].any()
+    if not clamped:  # a turn about t1 is taken out, and resisted
+        axis = ends.axis_of_foot(quaternion)
+        assert abs(np.dot(x[0, 3:], axis)) < 1e-15
+        assert np.dot(axis, diagonal[0, 3:, 3:] @ axis) > 0.1 * np.abs(np.diag(diagonal[0, 3:, 3:])).max()
 
 
 def test_recovery_takes_off_the_drag_of_the_velocities_at_the_ends():
