@@ -87,7 +87,7 @@ def report(scene: Scene) -> dict[str, Any]:
     forces = pipe.section_forces(state)
     touchdown = None
     if at.pipe.seabed is not None:
-        touchdown = _touchdown(pipe.s, found.position[:, 2], 0.125 * pipe.line.diameter)
+        touchdown = _touchdown(pipe.s, found.position[:, 2], 0.125 * pipe.line.loads.bed.diameter)
     top, foot = _without_noise(found.top), _without_noise(found.foot)
     return {
         "top_force_e_N": top[:3].tolist(),

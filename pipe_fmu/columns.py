@@ -8,7 +8,6 @@ import numpy as np
 
 from .compiled import inner, kernel
 from .lanes import WIDTH
-from .line import Line
 
 
 @inner
@@ -66,28 +65,3 @@ def columns(a, n, beyond):
 def column(a, n, beyond):
     """Column (p,) of a (m,); none of an array without entries."""
     return columns(a.reshape(a.shape[0], 1), n, beyond)[0]
-
-
-@kernel
-def line_columns(line):
-    """The line with its arrays as columns."""
-    n = line.mass.shape[0]
-    return Line(
-        column(line.length, n, 1.0),
-        columns(line.stiffness, n, 0.0),
-        columns(line.share, n, 1.0),
-        column(line.weight, n, 0.0),
-        column(line.bearing, n, 0.0),
-        columns(line.drag, n, 0.0),
-        column(line.diameter, n, 1.0),
-        column(line.mass, n, 0.0),
-        column(line.offset, n, 0.0),
-        columns(line.inertia, n, 0.0),
-        columns(line.spin_damping, n, 0.0),
-        columns(line.added_mass, n, 0.0),
-        column(line.damping, n, 0.0),
-        line.bed,
-        line.foot_clamped,
-        line.top_clamped,
-        line.numerical_damping,
-    )

@@ -10,9 +10,10 @@ from .element import ROWS, STRAINS, frame, gradients, resultant, strains
 from .geometric_stiffness import geometric_stiffness
 from .lane_arrays import grid, group, lane, row
 from .lanes import above, below
-from .loads import add_drag, add_mean_contact, bed_on_sag
-from .node_kernel import CONTACT, CURRENT, DRAG, END, INTERNAL, MIDDLE, NUMERICAL, PATH, turn_columns
+from .loads import add_mean_loads, even_on_sag, lies, press_mean_sag
+from .node_kernel import END, MIDDLE, PATH, turn_columns
 from .so3 import add, dot, left_jacobian, scale
+from .state import INTERNAL, NUMERICAL
 from .static_kernel import attitude, chord, vector_of
 
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)  # of the Gauss points of the path
@@ -22,14 +23,14 @@ _NO_MOTION = 1e-300  # square of a motion
 
 @inner
 def add_elements(line, water, first, count, h, old, new, fresh, sharp, system, sums, peaks):
-    """Add what the `count` elements from `first` on do; arrays as in step_kernel.assemble, works into `sums` (6,), the largest force and
+    """Add what the `count` elements from `first` on do; arrays as in step_kernel.assemble, works into `sums` (len(WORKS),), the largest force and
     moment at an end of an element into `peaks` (2,).
     """
     position, strain = old[0], old[5]
     moves, turned, new_strain = new
     a, b = group(first), group(first + 1)
     length, share = line.length[a], (line.share[0, a], line.share[1, a])
-    lies = line.bed.shape[0] > 0
+    by_sag = lies(line.loads)
     d, dd = chord(position, a, b), chord(moves, a, b)
     mean, final, stress, nine, vector = grid(7, 9), grid(7, 9), row(7), row(9), row(12)
     square, twelve, ends, drags = grid(9, 9), grid(12, 12), grid(2, 6), (grid(3, 12), grid(3, 12))
@@ -40,30 +41,20 @@ def add_elements(line, water, first, count, h, old, new, fresh, sharp, system, s
     if fresh:
         gradients(rm, u, psi, length, share, final)
     ahead = _stress(line, h, a, strain, new_strain, stress, sums)
-    _mean_force(a, b, length, share, d, moves, turned, strain, new_strain, fresh or lies, stress, mean, nine)
+    _mean_force(a, b, length, share, d, moves, turned, strain, new_strain, fresh or by_sag, stress, mean, nine)
     expand(nine, vector)
     for i in range(3):
         peaks[0] = max(peaks[0], math.fabs(vector[i]))
         peaks[1] = max(peaks[1], math.fabs(vector[3 + i]))
-    weight = length * line.weight[a]
-    vector[2] -= 0.5 * weight
-    vector[8] -= 0.5 * weight
-    rm, u, psi = frame(attitude(turned[MIDDLE], a), attitude(turned[MIDDLE], b), add(d, scale(0.5, dd)))
+    middle = frame(attitude(turned[MIDDLE], a), attitude(turned[MIDDLE], b), add(d, scale(0.5, dd)))
     if fresh:
-        if lies:
-            _press_sag(line, first, count, h, old, new, stress)
-        _tangent(line, a, (rm, u, psi), share, stress, ahead, mean, final, square)
+        if by_sag:
+            press_mean_sag(line.loads, first, count, line.length, h, old, new, stress)
+        _tangent(line, a, middle, share, stress, ahead, mean, final, square)
         expand_matrix(square, twelve)
     for i in range(6):
         ends[0, i], ends[1, i] = moves[i, a] / h, moves[i, b] / h
-    if water.drag:
-        depths = (position[2, a] + 0.5 * moves[2, a], position[2, b] + 0.5 * moves[2, b])
-        how = (line.drag[0, a], line.drag[1, a]), ends, depths, water.levels, water.velocities, 1.0 / h, fresh
-        dissipated, supplied = add_drag(rm, u, psi, length, *how, vector, twelve, drags)
-        sums[DRAG] += h * dissipated
-        sums[CURRENT] += h * supplied
-    if lies:
-        _add_bed(line, first, count, h, old, new, ends, mean, final, fresh, sharp, vector, twelve, drags[0], sums)
+    add_mean_loads(line, water, first, count, h, old, new, middle, ends, mean, final, fresh, sharp, vector, twelve, drags, sums)
     if fresh:
         turn_columns(left_jacobian(vector_of(moves, 3, a)), twelve, 12, 3)
         turn_columns(left_jacobian(vector_of(moves, 3, b)), twelve, 12, 9)
@@ -106,33 +97,6 @@ def _mean_force(a, b, length, share, d, moves, turned, strain, new_strain, by_ro
 
 
 @inner
-def _heights(e, old, new):
-    """(z of the two nodes and sag) of element e before and after."""
-    moves, _, new_strain = new
-    before = old[0][2, e], old[0][2, e + 1], old[5][STRAINS, e]
-    return before, (before[0] + moves[2, e], before[1] + moves[2, e + 1], new_strain[STRAINS, e])
-
-
-@inner
-def _press_sag(line, first, count, h, old, new, stress):
-    """Add the bed's part to what is conjugate to the sag, for the geometric stiffness."""
-    for m in range(count):
-        e = first + m
-        lane(stress, m)[STRAINS] += bed_on_sag(line.length[e], h, line.diameter[e], line.bearing[e], line.bed[0], *_heights(e, old, new))
-
-
-@inner
-def _add_bed(line, first, count, h, old, new, ends, mean, final, fresh, sharp, vector, twelve, scratch, sums):
-    """Add the bed's reaction to `vector` (12,) and, if `fresh`, `twelve` (12, 12)."""
-    for m in range(count):
-        e = first + m
-        bed = line.length[e], h, line.diameter[e], line.bearing[e], line.bed
-        sag_rows = lane(mean, m)[STRAINS], lane(final, m)[STRAINS]
-        into = lane(vector, m), lane(twelve, m), (lane(scratch, m),)
-        lane(sums, m)[CONTACT] += add_mean_contact(*bed, *_heights(e, old, new), lane(ends, m), *sag_rows, fresh, sharp, *into)
-
-
-@inner
 def _stress(line, h, a, strain, new_strain, stress, sums):
     """Mean section forces times length into `stress` (7,), with the works of damping; returns d stress / d strain over length x stiffness
     less a half."""
@@ -146,7 +110,7 @@ def _stress(line, h, a, strain, new_strain, stress, sums):
         stress[k] = modulus * (0.5 * (strain[k, a] + new_strain[k, a]) + ahead * change)
         sums[INTERNAL] += modulus * lag / h * change * change
         sums[NUMERICAL] += modulus * late * change * change
-    stress[STRAINS] = -length * line.weight[a] / 6.0
+    stress[STRAINS] = even_on_sag(line.loads, a, length)
     return ahead
 
 

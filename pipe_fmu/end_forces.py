@@ -7,7 +7,7 @@ from .compiled import inner
 from .element import ROWS, STRAINS, frame, gradients
 from .lane_arrays import grid, group, lane, row
 from .lanes import WIDTH
-from .loads import add_drag, add_press, press
+from .loads import add_instant_loads, even_on_sag
 from .so3 import apply, cross, matrix, scale
 from .static_kernel import attitude, chord
 
@@ -56,8 +56,7 @@ def end_forces(line, water, position, quaternion, velocity, spin, strain, ends, 
                 for i in range(9):
                     stress[k] += line.damping[a] * rows[k, i] * motion[i]
             stress[k] *= h * line.stiffness[k, a]
-        weight = h * line.weight[a]
-        stress[STRAINS] = -weight / 6.0
+        stress[STRAINS] = even_on_sag(line.loads, a, h)
         couple = cross((0.0, stress[1] / h, stress[2] / h), u)
         for i in range(3):
             mean[i], mean[3 + i] = stress[3 + i] / h, 0.5 * couple[i]
@@ -68,21 +67,10 @@ def end_forces(line, water, position, quaternion, velocity, spin, strain, ends, 
             for k in range(ROWS):
                 nine[i] += stress[k] * rows[k, i]
         expand(nine, vector)
-        vector[2] -= 0.5 * weight
-        vector[8] -= 0.5 * weight
-        if water.drag:
-            depths, coefficients = (position[2, a], position[2, b]), (line.drag[0, a], line.drag[1, a])
-            stream = water.levels, water.velocities
-            add_drag(rm, u, psi, h, coefficients, moves, depths, *stream, 0.0, False, vector, unused, drags)
-        for m in range(min(WIDTH, ends.shape[0] - first)):
+        count, scratch = min(WIDTH, ends.shape[0] - first), (unused, drags, points, by_sag)
+        add_instant_loads(line, water, first, count, (rm, u, psi), position, strain[STRAINS], moves, rows[STRAINS], vector, scratch)
+        for m in range(count):
             e, ours, means = first + m, lane(vector, m), lane(mean, m)
-            if line.bed.shape[0] > 0:
-                lies = line.length[e], line.diameter[e], line.bearing[e], position[2, e], position[2, e + 1], strain[STRAINS, e]
-                _, on_sag = press(*lies, lane(points, m))
-                add_press(lane(points, m), ours)
-                expand(lane(rows, m)[STRAINS], lane(by_sag, m))
-                for i in range(12):
-                    ours[i] += on_sag * lane(by_sag, m)[i]
             for i in range(12):
                 ends[e, i] = ours[i]
             for i in range(6):

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .arrays import Array
 from .energy import energies
-from .line import Array, Line, Water
+from .line import Line, Water
 from .newton import solve_step
 from .state import WORKS, PipeState
 from .static_kernel import INSIDE_OUT, inverted
@@ -64,6 +65,6 @@ def _flaw(line: Line, old: PipeState, new: PipeState) -> str:
     return INSIDE_OUT if inverted(new.position, new.quaternion) else ""
 
 
-def energy_of(line: Line, state: PipeState) -> tuple[float, float, float, float]:
-    """(kinetic, elastic, gravity, contact) [J]."""
+def energy_of(line: Line, state: PipeState) -> tuple[float, ...]:
+    """Energies [J], in the order of state.ENERGIES."""
     return energies(line, state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain)

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .line import Array
+from .arrays import Array
 from .parameters import PipeParameters
 
 _FINE = 0.6  # element at an end over the bending length

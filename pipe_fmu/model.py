@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from . import catenary, mesh, section_forces, statics
+from .arrays import Array
 from .element import ROWS
-from .line import Array, Line, Water, shear_stiffness
+from .line import Line, Water, shear_stiffness
+from .loads import loads_of
 from .parameters import PipeParameters, Section
 from .step_kernel import element_strains
 
@@ -114,36 +116,27 @@ def _placed(parameters: PipeParameters, s: Array) -> PipeParameters:
 def _line(parameters: PipeParameters, s: Array) -> Line:
     """Element and node data on the nodes `s` (n,)."""
     h = np.diff(s)
-    density = parameters.environment.water_density
     section = _picker(parameters, s)
     stiffness = section(lambda one: one.stiffness)
     k2, p2 = shear_stiffness(stiffness[:, 1], stiffness[:, 4], h)
     k3, p3 = shear_stiffness(stiffness[:, 1], stiffness[:, 3], h)
     carried = mass_per_length(parameters, s)
     mass = carried.along
-    diameter = section(lambda one: one.hydrodynamic_diameter)
     added = np.zeros((0, 3))
     if parameters.added_mass is not None:
         across = carried.across - mass
         added = _lump(np.column_stack([0.0 * across, across, across]), h)
-    bed = np.zeros(0)
-    if parameters.seabed is not None:
-        bed = np.array([parameters.seabed.damping, parameters.seabed.friction, parameters.seabed.friction_speed])
     line = Line(
         length=h,
         stiffness=np.column_stack([stiffness[:, 0], k2, k3, stiffness[:, 2:]]),
         share=np.column_stack([p2, p3]),
-        weight=section(parameters.weight),
-        bearing=_by_section(parameters, s, np.array(parameters.bearing())),
-        drag=0.5 * density * diameter[:, None] * section(lambda one: (one.drag_tangential, one.drag_normal)),
-        diameter=diameter,
+        loads=loads_of(parameters, section, _by_section(parameters, s, np.array(parameters.bearing()))),
         mass=_lump(mass[:, None], h)[:, 0],
         offset=_ahead(carried.across, h),
         inertia=_lump(section(lambda one: one.inertia), h),
         spin_damping=_lump(section(lambda one: one.rotational_damping), h),
         added_mass=added,
         damping=np.full(len(h) if parameters.internal_damping > 0.0 else 0, parameters.internal_damping),
-        bed=bed,
         foot_clamped=parameters.foot == "clamped",
         top_clamped=parameters.top == "clamped",
         numerical_damping=float(parameters.numerical_damping),

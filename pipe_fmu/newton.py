@@ -5,13 +5,14 @@ import math
 import numpy as np
 
 from .block_tridiagonal import SIZE, condense, factorize, substitute
-from .columns import line_columns, take
+from .columns import take
 from .compiled import inner, kernel
 from .element import STRAINS
 from .ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
 from .lanes import larger
+from .line import line_columns
 from .node_kernel import advance
-from .state import PipeState
+from .state import WORKS, PipeState
 from .step_kernel import assemble, old_columns
 
 TOLERANCE = 1e-11  # of the largest element force (moment), inertia included as below: well below any coupling tolerance
@@ -88,7 +89,7 @@ def _made(line, old, x, residual, force, works):
     for j in range(held):
         top += force[j] * x[n - 1, j]
     for e in range(n - 1):
-        weight = 0.5 * line.length[e] * line.weight[e]
+        weight = 0.5 * line.length[e] * line.loads.weight[e]
         fall += weight * (x[e, 2] + x[e + 1, 2])
         stored += math.fabs(weight * (z[e] + z[e + 1]))
         for k in range(STRAINS):
@@ -109,7 +110,7 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful
     n = state.position.shape[0]
     ours = line_columns(line)
     old, new = old_columns(state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain)
-    x, top, works = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE)
+    x, top, works = np.empty((n, SIZE)), np.empty(SIZE), np.empty(len(WORKS))
     for k in range(3):
         top[k], top[3 + k] = h * velocity[k], h * spin[k]
     for i in range(n):
@@ -149,6 +150,7 @@ def _advanced(line, h, state, old, new, x, force, works):
     top_work = state.top_work
     for k in range(SIZE):
         top_work += force[k] * x[-1, k]
+    for k in range(works.shape[0]):
         works[k] += state.works[k]
     return PipeState(state.time + h, position, quaternion, velocity, rate, flow, strain, last, state.last, state.before, top_work, works)
 
@@ -163,7 +165,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
     The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
     is made anew for every further one. A `careful` search makes it anew always, starts with a tangent of friction with which nothing
     overshoots, and halves a correction that does not lower the residual. Fills the force on the pipe's top (6,), the tangent (6, 6) as the
-    top feels it and the works (6,). Returns (converged, corrections, residual).
+    top feels it and the works (len(WORKS),). Returns (converged, corrections, residual).
 
     ends: quaternions (n, 4), mobility, top, force, tangent; system: as in step_kernel.assemble; scratch: (n, 6), (6,), (6,), (n, 6).
     """

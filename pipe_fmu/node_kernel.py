@@ -19,9 +19,9 @@ from .so3 import (
     normalize,
     scale,
 )
+from .state import ROTATIONAL
 from .static_kernel import attitude, vector_of
 
-DRAG, CURRENT, SPIN, INTERNAL, CONTACT, NUMERICAL = range(6)  # works over the step, in the order of state.WORKS
 PATH = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15), 1.0)  # of a step: three Gauss points and the end,
 MIDDLE, END = 1, 3  # of which two are named
 
@@ -109,7 +109,7 @@ def _add_node(line, i, h, old, moves, turned, fresh, block, residual, works):
     momentum = apply(r_new, (j[0] * w_new[0], j[1] * w_new[1], j[2] * w_new[2]))
     before = apply(r_old, (j[0] * w_old[0], j[1] * w_old[1], j[2] * w_old[2]))
     brake = apply(r_mid, (c[0] * turn[0] / h, c[1] * turn[1] / h, c[2] * turn[2] / h))
-    works[SPIN] += (c[0] * turn[0] * turn[0] + c[1] * turn[1] * turn[1] + c[2] * turn[2] * turn[2]) / h
+    works[ROTATIONAL] += (c[0] * turn[0] * turn[0] + c[1] * turn[1] * turn[1] + c[2] * turn[2] * turn[2]) / h
     for a in range(3):
         residual[3 + a] += (momentum[a] - before[a]) / h + brake[a]
         for b in range(3 if fresh else 0):

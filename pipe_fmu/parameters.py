@@ -12,6 +12,7 @@ from typing import Literal
 
 from .checks import check_fields, number
 from .environment import Environment
+from .loads import Seabed
 
 Vector3 = tuple[float, float, float]
 End = Literal["clamped", "pinned"]
@@ -116,21 +117,6 @@ class Section:
         second = self.second_moment if self.wall_thickness is not None else self.outer_area**2 / (4.0 * math.pi)
         across = (self.density if self.mass is None else self.mass / area) * second
         return 2.0 * across, across, across
-
-
-@dataclass(frozen=True)
-class Seabed:
-    """Elastic bed in the plane z = 0 (seabed.py), with damping and Coulomb friction."""
-
-    damping: float = number(1.0, "s/m", "dashpot: share of the elastic reaction per speed of penetration", min=0.0)
-    friction: float = number(0.0, "1", "Coulomb coefficient", min=0.0)
-    friction_speed: float = number(1e-3, "m/s", "speed below which friction is viscous", above=0.0)
-    reference_weight: float | None = number(
-        None, "N/m", "weight per length that lies at z = 0, from which the stiffness follows, instead of the section's", above=0.0
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)

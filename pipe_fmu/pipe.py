@@ -3,8 +3,8 @@
 import numpy as np
 
 from . import integrator, model, section_forces, statics, wall_stress
+from .arrays import Array
 from .integrator import STIFF, PipeState, StepResult
-from .line import Array
 from .parameters import PipeParameters
 from .section_forces import SectionForces
 from .so3 import matrix
@@ -51,8 +51,8 @@ class Pipe:
         """
         return integrator.step(self.line, self.water(state.time + 0.5 * h), state, velocity, spin, h, mobility)
 
-    def energies(self, state: PipeState) -> tuple[float, float, float, float]:
-        """(kinetic, elastic, gravity, contact) [J]."""
+    def energies(self, state: PipeState) -> tuple[float, ...]:
+        """Energies [J], in the order of state.ENERGIES."""
         return integrator.energy_of(self.line, state)
 
     def section_forces(self, state: PipeState) -> SectionForces:

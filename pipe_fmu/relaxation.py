@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .line import Array
+from .arrays import Array
 from .static_balance import Balance, Factors, limited
 
 TOLERANCE = 1e-11  # of the line's weight or largest end force (times its longest element, for moments)

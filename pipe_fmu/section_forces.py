@@ -23,10 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .columns import columns, fill_straight, line_columns, room
+from .columns import columns, fill_straight, room
+from .arrays import Array
 from .compiled import inner, kernel
 from .end_forces import end_forces, matrix_at, node_motion
-from .line import Array
+from .line import line_columns
 from .so3 import add, apply, apply_transposed, dot, scale, subtract
 
 SAMPLES = 8  # parts of an element between whose ends a largest value is sought

@@ -5,25 +5,25 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from . import substeps
-from .integrator import WORKS
-from .line import Array
+from . import loads, substeps
+from .arrays import Array
 from .model import resolve
 from .parameters import PipeParameters
 from .pipe import Pipe
+from .state import LEDGER
 
 Port = tuple[int, str | tuple[str, ...], str]
 
 _MOTION = "of the hang-off point, mean over the coming step, in e"
 UNSTABLE = "statics: the equilibrium is not stable; the line will leave it at the least push"
 _PULL = "of the pipe on the vessel at the hang-off point, in e"
-_WORKS = tuple(f"{work}_work" if work == "current" else f"{work}_dissipation" for work in WORKS)  # their ports
+_ENERGIES = tuple(port for port in LEDGER if port.endswith("_energy"))
+_WORKS = tuple(port for port in LEDGER if port not in _ENERGIES)
 _MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) + 3 * ("rad/(N.m.s)",))
 _IMPEDANCE = 3 * (3 * ("N.s/m",) + 3 * ("N.s/rad",)) + 3 * (3 * ("N.s",) + 3 * ("N.m.s/rad",))
 _AT_LEAST_ZERO = (
-    "kinetic_energy", "elastic_energy", "contact_energy", "drag_dissipation", "rotational_dissipation", "contact_dissipation",
-    "internal_dissipation", "numerical_dissipation", "pipe_length", "largest_bending_moment", "largest_von_mises", "newton_iterations",
-    "newton_residual", "s",
+    *(port for port, (_, least) in LEDGER.items() if least == 0.0),
+    "pipe_length", "largest_bending_moment", "largest_von_mises", "newton_iterations", "newton_residual", "s",
 )  # fmt: skip
 
 
@@ -70,17 +70,12 @@ class PipeUnit:
             "top_position": (3, "m", "position of the top, in e"),
             "top_quaternion": (4, "1", "attitude of the top section, scalar first"),
             "impedance": (36, _IMPEDANCE, "d(force, moment on the pipe) / d(velocity, angular velocity), row by row; of the last sub-step"),
-            "kinetic_energy": (1, "J", "kinetic energy"),
-            "elastic_energy": (1, "J", "strain energy"),
-            "gravity_energy": (1, "J", "potential energy of the submerged weight, zero at the bed"),
-            "top_work": (1, "J", "work done on the pipe at its top since the start"),
-            "current_work": (1, "J", "work done on the pipe by the current since the start"),
-            "drag_dissipation": (1, "J", "energy dissipated by drag since the start"),
-            "rotational_dissipation": (1, "J", "energy dissipated by rotational damping since the start"),
         }
-        for name, present in _optional(parameters).items():
-            if present:
-                ports[name] = (1, "J", name.replace("_", " ") + (" of the bed" if "contact" in name else " since the start"))
+        absent = [port for port, present in _optional(parameters).items() if not present]
+        booked: dict[str, Port] = {port: (1, "J", text) for port, (text, _) in LEDGER.items() if port not in absent}
+        top_work: Port = (1, "J", "work done on the pipe at its top since the start")
+        energies = {port: booked.pop(port) for port in _ENERGIES if port in booked}
+        ports |= energies | {"top_work": top_work} | booked
         ports |= {
             "pipe_length": (1, "m", "length of the stretched centreline"),
             "largest_tension": (1, "N", "largest effective tension at the nodes"),
@@ -166,8 +161,7 @@ class PipeUnit:
         elif name == "impedance":
             memo[name] = np.ravel(impedance)
         elif name.endswith("_energy"):
-            kinds = ("kinetic_energy", "elastic_energy", "gravity_energy", "contact_energy")
-            memo |= {kind: np.array([value]) for kind, value in zip(kinds, self._pipe.energies(state), strict=True)}
+            memo |= {port: np.array([value]) for port, value in zip(_ENERGIES, self._pipe.energies(state), strict=True)}
         elif name == "top_work":
             memo[name] = np.array([state.top_work])
         elif name in _WORKS:
@@ -204,8 +198,7 @@ class PipeUnit:
 
 def _optional(parameters: PipeParameters) -> dict[str, bool]:
     return {
-        "contact_energy": parameters.seabed is not None,
-        "contact_dissipation": parameters.seabed is not None,
+        **loads.present(parameters),
         "internal_dissipation": parameters.internal_damping > 0.0,
         "numerical_dissipation": parameters.numerical_damping > 0.0,
     }

@@ -8,8 +8,9 @@ import math
 import numpy as np
 
 from .block_tridiagonal import SIZE
+from .arrays import Array
 from .compiled import kernel
-from .line import Array, Line
+from .line import Line
 from .so3 import matrix
 
 

@@ -2,9 +2,20 @@
 
 from typing import NamedTuple
 
-from .line import Array
+from . import loads
+from .arrays import Array
 
-WORKS = ("drag", "current", "rotational", "internal", "contact", "numerical")
+LEDGER = {  # ports of energies and works: what they are, and the least they can be
+    "kinetic_energy": ("kinetic energy", 0.0),
+    "elastic_energy": ("strain energy", 0.0),
+    **loads.LEDGER,
+    "rotational_dissipation": ("energy dissipated by rotational damping since the start", 0.0),
+    "internal_dissipation": ("energy dissipated by internal damping since the start", 0.0),
+    "numerical_dissipation": ("energy dissipated by numerical damping since the start", 0.0),
+}
+ENERGIES = tuple(port.removesuffix("_energy") for port in LEDGER if port.endswith("_energy"))
+WORKS = tuple(port.rpartition("_")[0] for port in LEDGER if not port.endswith("_energy"))
+ROTATIONAL, INTERNAL, NUMERICAL = (WORKS.index(name) for name in ("rotational", "internal", "numerical"))
 
 
 class PipeState(NamedTuple):
@@ -21,7 +32,7 @@ class PipeState(NamedTuple):
     before: Array  # (n, 6) those of the step before
     earlier: Array  # (n, 6) and of the one before that
     top_work: float  # work done on the pipe at its top since the start [J]
-    works: Array  # (6,) work or dissipation since the start [J], in the order of WORKS
+    works: Array  # (len(WORKS),) works and dissipations since the start [J], in their order
 
 
 # numba knows a type within a tuple by its name: a pipe of another package in the process (an FMU brings its own) must not pass for this

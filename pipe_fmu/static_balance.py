@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .block_tridiagonal import condense, factorize, substitute
+from .arrays import Array
 from .compiled import kernel
 from .ends import condense_top, hold_foot, hold_foot_tangent, top_correction
-from .line import Array, Line, Water
+from .line import Line, Water
 from .so3 import exp, multiply, normalize
 from .stability import positive
 from .static_kernel import INSIDE_OUT, attitude, inverted, static_system
@@ -49,7 +50,7 @@ class Scales:
 
     def __init__(self, line: Line) -> None:
         length = float(line.length.sum())
-        self.force = max(float(np.abs(line.weight * line.length).sum()), float(line.stiffness[:, 4:].min()) / length**2)
+        self.force = max(float(np.abs(line.loads.weight * line.length).sum()), float(line.stiffness[:, 4:].min()) / length**2)
         self.arm = np.array([1.0] * 3 + [float(line.length.max())] * 3)
         node = 0.5 * (np.append(line.length, 0.0) + np.append(0.0, line.length))
         self.metric = self.force / length * np.column_stack([node] * 3 + [node**3 / 12.0] * 3)

@@ -6,8 +6,7 @@ from .assembly import add_matrix, add_vector, clear, expand, expand_matrix
 from .compiled import inner, kernel
 from .element import ROWS, STRAINS, frame, gradients, strains
 from .geometric_stiffness import geometric_stiffness
-from .loads import add_press, add_press_stiffness, press
-from .static_drag import add_static_drag
+from .loads import NO_ENERGY, add_static_loads, potentials, press_sag, summed
 
 INSIDE_OUT = "turned inside out"  # see `inverted`
 
@@ -45,7 +44,7 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
     """Fill the tangent (n, 6, 6), (n-1, 6, 6) x 2 and residual (n, 6) = internal - external forces; boundary rows untouched.
 
     position (n, 3), quaternion (n, 4); `pull` (n, 6) is filled with minus the drag, which the residual contains.
-    Returns the potentials (elastic, gravity, contact) [J]; the drag of the current has none. The tangent is exact.
+    Returns the potentials [J], elastic and those of loads.ENERGIES; the drag of the current has none. The tangent is exact.
     """
     clear(diagonal, lower, upper)
     residual[:] = 0.0
@@ -60,28 +59,23 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
     matrix = np.empty((12, 12))
     row = np.empty(12)
     points = np.zeros((4, 2))
-    elastic, gravity, pressed = 0.0, 0.0, 0.0
+    elastic, stored = 0.0, NO_ENERGY
     for e in range(line.length.shape[0]):
         h = line.length[e]
-        rm, u, psi = frame(attitude(quaternion.T, e), attitude(quaternion.T, e + 1), chord(position.T, e, e + 1))
-        strains(rm, u, psi, h, line.share[e], strain)
-        gradients(rm, u, psi, h, line.share[e], rows)
+        arc = frame(attitude(quaternion.T, e), attitude(quaternion.T, e + 1), chord(position.T, e, e + 1))
+        strains(*arc, h, line.share[e], strain)
+        gradients(*arc, h, line.share[e], rows)
         for k in range(STRAINS):
             stress[k] = h * line.stiffness[e, k] * strain[k]
             elastic += 0.5 * stress[k] * strain[k]
-        weight = h * line.weight[e]
-        stress[STRAINS] = -weight / 6.0
         z1, z2 = position[e, 2], position[e + 1, 2]
-        if line.bed.shape[0] > 0:
-            energy, on_sag = press(h, line.diameter[e], line.bearing[e], z1, z2, strain[STRAINS], points)
-            pressed += energy
-            stress[STRAINS] += on_sag
-        gravity -= weight * (0.5 * (z1 + z2) + strain[STRAINS] / 6.0)
+        stored = summed(stored, potentials(line.loads, e, h, z1, z2, strain[STRAINS]))
+        stress[STRAINS] = press_sag(line.loads, e, h, z1, z2, strain[STRAINS], points)
         nine[:] = 0.0
         for k in range(ROWS):
             for i in range(9):
                 nine[i] += stress[k] * rows[k, i]
-        geometric_stiffness(rm, u, psi, h, line.share[e], stress, square)
+        geometric_stiffness(*arc, h, line.share[e], stress, square)
         for k in range(STRAINS):
             for i in range(9):
                 push = h * line.stiffness[e, k] * rows[k, i]
@@ -89,17 +83,9 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
                     square[i, j] += push * rows[k, j]
         expand(nine, vector)
         expand_matrix(square, matrix)
-        vector[2] -= 0.5 * weight
-        vector[8] -= 0.5 * weight
-        if line.bed.shape[0] > 0:
-            add_press(points, vector)
-            add_press_stiffness(points, rows[STRAINS], matrix, row)
-        if water.drag and water.levels.shape[0] > 0:
-            drag[:] = 0.0
-            add_static_drag(rm, u, psi, h, line.drag[e], z1, z2, water.levels, water.velocities, drag, matrix)
-            add_vector(pull, e, drag)
-            for i in range(12):
-                vector[i] += drag[i]
+        drag[:] = 0.0
+        add_static_loads(line, water, e, arc, z1, z2, rows[STRAINS], points, row, vector, matrix, drag)
+        add_vector(pull, e, drag)
         add_vector(residual, e, vector)
         add_matrix(diagonal, lower, upper, e, matrix)
-    return elastic, gravity, pressed
+    return elastic, *stored

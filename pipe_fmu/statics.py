@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from . import catenary
-from .line import Array, Line, Water
+from .arrays import Array
+from .line import Line, Water
 from .relaxation import DESCENTS, relax
 from .so3 import conjugate, exp, log, multiply, scale
 from .static_balance import Balance, Factors, Pose, Scales
@@ -132,8 +133,8 @@ def equilibrium(line: Line, water: Water, scales: Scales, pose: Pose, descents: 
 
 def _catenary(line: Line, s: Array, top: tuple[float, float, float]) -> Pose:
     """Pose in which the search starts."""
-    floats = float(line.weight @ line.length) < 0.0
-    position, quaternion = catenary.shape(s, float(s[-1]), top, line.bed.shape[0] > 0, floats)
+    floats = float(line.loads.weight @ line.length) < 0.0
+    position, quaternion = catenary.shape(s, float(s[-1]), top, line.loads.bed.bearing.size > 0, floats)
     if line.foot_clamped:
         quaternion[0] = _LEVEL
     return position, quaternion

@@ -21,15 +21,19 @@ import math
 import numpy as np
 
 from .assembly import clear
-from .columns import columns, fill, fill_straight, line_columns, room, take
+from .columns import columns, fill, fill_straight, room, take
 from .compiled import inner, kernel
 from .element import ROWS, frame, strains
 from .element_kernel import add_elements
 from .lane_arrays import group, row
 from .lanes import WIDTH, largest, total
+from .line import line_columns
 from .node_kernel import PATH, add_nodes
 from .so3 import exp, multiply, scale
+from .state import WORKS
 from .static_kernel import attitude, chord, vector_of
+
+_COUNT = len(WORKS)
 
 
 @kernel
@@ -84,10 +88,10 @@ def folded(length, old, new):
 def step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, sharp, system, works):
     """Residual of the step for trial increments `x` (n, 6), and the tangent if `fresh`, into `system` = (diagonal, lower, upper, residual).
 
-    `sharp`: see add_mean_contact.
+    `sharp`: see loads.bed.add_mean_contact.
 
     position, velocity (n, 3), quaternion (n, 4), rate (n, 3) body rates, flow (n, 3) or (0, 3) body velocity of the added mass,
-    strain (n - 1, 7): old state. Fills new_strain (n - 1, 7) and works (6,). Returns (force scale [N], moment scale [N m]).
+    strain (n - 1, 7): old state. Fills new_strain (n - 1, 7) and works (len(WORKS),). Returns (force scale [N], moment scale [N m]).
     """
     old, new = old_columns(position, quaternion, velocity, rate, flow, strain)
     scales = assemble(line_columns(line), water, h, old, new, x, fresh, sharp, system, works)
@@ -106,8 +110,8 @@ def assemble(line, water, h, old, new, x, fresh, sharp, system, works):
     n = x.shape[0]
     fill(x, moves)
     _follow(moves, old[1], n, turned)
-    sums, peaks = row(6), row(2)
-    for k in range(6):
+    sums, peaks = row(_COUNT), row(2)
+    for k in range(_COUNT):
         sums[k] = 0.0
     for k in range(2):
         peaks[k] = 0.0
@@ -115,7 +119,7 @@ def assemble(line, water, h, old, new, x, fresh, sharp, system, works):
         add_elements(line, water, first, min(WIDTH, n - 1 - first), h, old, new, fresh, sharp, system, sums, peaks)
     for first in range(0, n, WIDTH):
         add_nodes(line, first, min(WIDTH, n - first), h, old, moves, turned, fresh, diagonal, residual, sums)
-    for k in range(6):
+    for k in range(_COUNT):
         works[k] = total(sums[k])
     return largest(peaks[0]), largest(peaks[1])
 

@@ -14,8 +14,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .arrays import Array
 from .integrator import PipeState, StepResult
-from .line import Array
 
 DIVISOR = 3
 

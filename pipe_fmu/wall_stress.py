@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .arrays import Array
 from .compiled import inner
-from .line import Array
 from .parameters import PipeParameters
 from .section_forces import SAMPLES, SectionForces, bending_square
 

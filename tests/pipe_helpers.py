@@ -131,7 +131,12 @@ def bar(length, nodes, *, axial, shear, torsion, bending, bending_3=None, mass=1
     )
     where = (0.5 * length, 0.0, -0.3 * length)
     pipe = Pipe(PipeParameters(length=length, nodes=nodes, mesh="uniform", section=section, top_position=where))
-    return pipe.s, pipe.line._replace(weight=np.full(nodes - 1, float(weight)), **changes)
+    return pipe.s, loaded(pipe.line, weight=np.full(nodes - 1, float(weight)))._replace(**changes)
+
+
+def loaded(line, **changes):
+    """The line with other columns of its loads."""
+    return line._replace(loads=line.loads._replace(**changes))
 
 
 STILL = Water(np.zeros(0), np.zeros((0, 3)), False)
@@ -218,7 +223,7 @@ def step_system(line, old, x, h, water=STILL, flow=None):
     n = len(x)
     position, quaternion, velocity, rate = old
     system = np.empty((n, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n - 1, 6, 6)), np.empty((n, 6))
-    strain, new_strain, works = np.empty((n - 1, 7)), np.empty((n - 1, 7)), np.empty(6)
+    strain, new_strain, works = np.empty((n - 1, 7)), np.empty((n - 1, 7)), np.empty(len(WORKS))
     step_kernel.element_strains(line, position, quaternion, strain)
     flow = np.zeros((len(line.added_mass), 3)) if flow is None else flow
     step_kernel.step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, True, True, system, works)

@@ -164,7 +164,7 @@ def compare(pipe: Pipe, found: Equilibrium, fine: Pipe, best: Equilibrium) -> tu
     """
     if not best.converged:
         return math.inf, math.inf
-    weight = float(np.abs(fine.line.weight) @ fine.line.length)
+    weight = float(np.abs(fine.line.loads.weight) @ fine.line.length)
     force = max(float(np.linalg.norm(best.top[:3])), 0.1 * weight)
     moments = [p.largest_bending_moment(p.section_forces(p.at_rest(f))) for p, f in ((pipe, found), (fine, best))]
     bending = math.sqrt(float(fine.line.stiffness[:, 4].max()) * force)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from pipe_helpers import bar, dense_equilibrium, rotation, rotation_vector_quaternion, straight, times
+from pipe_helpers import bar, dense_equilibrium, loaded, rotation, rotation_vector_quaternion, straight, times
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
@@ -226,7 +226,7 @@ def test_heavy_elastica(weight, tolerance):
         s, line = bar(length, n, **stiff)
         at = straight(s)
         for part in np.geomspace(0.5 / weight, 1.0, 2 + round(6 * math.log(weight + 1.0))):
-            own = line._replace(weight=np.full(n - 1, part * weight * bending / length**3))
+            own = loaded(line, weight=np.full(n - 1, part * weight * bending / length**3))
             at = clamped(own, *at, limit=100)
         tips.append(at[0][-1])
     exact, _ = cantilever(length, [1e7] * 3 + [bending] * 3, at[1][-1], load=(0.0, 0.0, weight * bending / length**3))

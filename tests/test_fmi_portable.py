@@ -122,14 +122,14 @@ def test_a_c_host_gets_what_fmpy_gets_to_the_last_bit_and_starts_soon(host, plai
 def test_a_portable_fmu_runs_on_a_system_without_python_to_the_last_bit_and_compiles_nothing(plain, carrying, bare, unit):
     expected = in_python(carrying / f"{unit}.fmu", unit)
     c_host.unpacked(carrying / f"{unit}.fmu", bare / unit)
-    shipped = {path.name for path in (bare / unit / "resources").glob("*/__pycache__/*.nb[ci]")}
+    shipped = {path.name for path in (bare / unit / "resources").rglob("*.nb[ci]")}
     done = c_host.run([CHROOT, str(bare), *command("/host", unit, bare / unit, Path("/", unit), expected)])
     np.testing.assert_array_equal(values(done), np.concatenate(list(expected.values())))
     others = in_python(plain / f"{unit}.fmu", unit)  # kernels for this very processor: round-off of another order
     for name, value in expected.items():
         np.testing.assert_allclose(value, others[name], rtol=0.0, atol=1e-8 * np.abs(others[name]).max(), err_msg=name)
     assert len(shipped) > 5
-    assert {path.name for path in bare.glob(f"tmp/*/units/{unit}_*/__pycache__/*.nb[ci]")} == shipped
+    assert {path.name for path in bare.glob(f"tmp/*/units/{unit}_*/**/*.nb[ci]")} == shipped
 
 
 def test_a_plain_fmu_says_there_that_its_python_is_gone(plain, bare):

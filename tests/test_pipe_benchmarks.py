@@ -8,6 +8,7 @@ from pipe_helpers import (
     bar,
     dense_equilibrium,
     free_step,
+    loaded,
     pitch,
     rotation,
     rotation_vector_quaternion,
@@ -215,7 +216,7 @@ def test_sinking_line_reaches_its_terminal_velocity(along):
     """v = sqrt(w / (rho d D / 2)) across and along; from rest v(t) = v tanh(w t / (m v))."""
     weight, mass, across, lengthwise = 300.0, 40.0, 120.0, 3.0
     s, line = bar(60.0, 7, axial=1e8, shear=1e10, torsion=1e9, bending=1e9, mass=mass, weight=weight)
-    line = line._replace(drag=np.tile([lengthwise, across], (6, 1)))
+    line = loaded(line, drag=np.tile([lengthwise, across], (6, 1)))
     position, attitude = straight(s, (0.0, 0.0, -1.0), UPRIGHT) if along else straight(s)
     terminal = math.sqrt(weight / (lengthwise if along else across))
     water = Water(np.zeros(0), np.zeros((0, 3)), True)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipe_helpers import P16, assembled, bar, rotation, started, straight
+from pipe_helpers import P16, assembled, bar, loaded, rotation, started, straight
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
@@ -60,7 +60,7 @@ def test_recovery_takes_off_the_drag_of_the_velocities_at_the_ends():
     a bar under a linear load: h (3, 7) / 20 below, h (7 + 2 x 3, 3 + 2 x 7) / 20 above, per length.
     """
     s, line = bar(12.0, 3, axial=1e8, shear=1e8, torsion=1e6, bending=1e6)
-    line = line._replace(drag=np.full((2, 2), 50.0))
+    line = loaded(line, drag=np.full((2, 2), 50.0))
     velocity, still = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 2.0, 0.0]]), np.zeros((3, 3))
     water, mass = Water(np.zeros(0), np.zeros((0, 3)), True), section_forces.MassPerLength(*np.ones((2, 2)))
     found = section_forces.nodal_wrenches(line, mass, water, *straight(s), velocity, still, np.zeros((2, 7)))

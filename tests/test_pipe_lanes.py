@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 from numba.core.errors import TypingError
-from pipe_helpers import bar
+from pipe_helpers import bar, loaded
 
 from pipe_fmu.columns import fill_straight, line_columns, room
 from pipe_fmu.lane_arrays import grid, group, lane, row, rows_of_six, six
@@ -114,17 +114,26 @@ def test_columns_have_room_for_the_last_nodes_and_for_the_upper_ends_of_the_last
         assert room(n) >= max(nodes[-1] + WIDTH, elements[-1] + 1 + WIDTH)
 
 
+def fields(*lines):
+    """(name, values...) of the arrays of lines, those of nested tuples too."""
+    for name, *parts in zip(lines[0]._fields, *lines, strict=True):
+        if isinstance(parts[0], tuple):
+            yield from fields(*parts)
+        elif isinstance(parts[0], np.ndarray):
+            yield name, *parts
+
+
 def test_behind_its_end_a_line_goes_on_straight_and_without_what_would_add():
     position, out = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, -1.0], [3.0, 3.0, -1.5]]), np.empty((3, room(3)))
     fill_straight(position, out)
     ahead = np.arange(1, room(3) - 2)[:, None] * [2.0, 1.0, -0.5]
     np.testing.assert_array_equal(out.T, np.vstack([position, position[-1] + ahead]))
-    present = {"weight": np.ones(2), "damping": np.ones(2), "drag": np.ones((2, 2)), "offset": np.ones(3)}
-    present |= {"added_mass": np.ones((3, 3)), "spin_damping": np.ones((3, 3))}
+    present = {"damping": np.ones(2), "offset": np.ones(3), "added_mass": np.ones((3, 3)), "spin_damping": np.ones((3, 3))}
     line = bar(10.0, 3, axial=1e5, shear=1e5, torsion=80.0, bending=100.0)[1]._replace(**present)
-    for name, before, there in zip(line._fields, line, line_columns(line), strict=True):
-        if name in ("bed", "foot_clamped", "top_clamped", "numerical_damping"):
-            continue
+    on_bed = Bed(np.ones(2), np.ones(2), 1.0, 0.5, 1e-3)
+    line = loaded(line, weight=np.ones(2), drag=np.ones((2, 2)), bed=on_bed)
+
+    for name, before, there in fields(line, line_columns(line)):
         beyond = there[..., len(before) :]
         assert there.shape[-1] == room(3)
         np.testing.assert_array_equal(there[..., : len(before)], before.T)

@@ -7,35 +7,41 @@ import pytest
 from pipe_helpers import rotation, rotation_vector_quaternion, times
 from reference_bvp import bed_reaction
 
-from pipe_fmu import assembly, element, hydrodynamics, loads, seabed
+from pipe_fmu import assembly, element
 from pipe_fmu.environment import Current
+from pipe_fmu.loads import bed, current, drag
 
 DIAMETER, WEIGHT = 0.4, 760.0
 SCRATCH = np.empty((2, 3, 12))
 LIFT_OFF, KNEE = -DIAMETER / 8, -DIAMETER / 8 + DIAMETER / 20
 
 
+def on_bed(damping=0.0, friction=0.0, friction_speed=1e-3):
+    """The bed under one element."""
+    return bed.Bed(np.array([WEIGHT]), np.array([DIAMETER]), damping, friction, friction_speed)
+
+
 def test_the_bed_carries_a_pipe_lying_on_it_with_its_weight():
-    _, force, stiffness = seabed.contact(0.0, DIAMETER, WEIGHT)
+    _, force, stiffness = bed.contact(0.0, DIAMETER, WEIGHT)
     assert force == pytest.approx(WEIGHT, rel=1e-14)
     assert stiffness == pytest.approx(WEIGHT / (0.1 * DIAMETER), rel=1e-14)
 
 
 def test_the_bed_is_the_published_law():
     for z in np.linspace(-0.1, 0.3, 401):
-        assert seabed.contact(z, DIAMETER, WEIGHT)[1] == pytest.approx(float(bed_reaction(z, DIAMETER, WEIGHT)), rel=1e-12, abs=1e-9)
+        assert bed.contact(z, DIAMETER, WEIGHT)[1] == pytest.approx(float(bed_reaction(z, DIAMETER, WEIGHT)), rel=1e-12, abs=1e-9)
 
 
 @pytest.mark.parametrize("at", [LIFT_OFF, KNEE])
 def test_the_bed_is_continuous_with_its_slope_at_lift_off_and_knee(at):
-    below, above = (np.array(seabed.contact(at + side * 1e-12, DIAMETER, WEIGHT)) for side in (-1, 1))
+    below, above = (np.array(bed.contact(at + side * 1e-12, DIAMETER, WEIGHT)) for side in (-1, 1))
     np.testing.assert_allclose(below, above, rtol=1e-9, atol=1e-5)  # slope of the stiffness times 2e-12 m
 
 
 def test_force_and_stiffness_of_the_bed_are_the_derivatives_of_its_potential():
     step = 1e-6
     for z in (-0.049, -0.04, -0.031, -0.02, 0.0, 0.1):
-        up, here, down = (seabed.contact(x, DIAMETER, WEIGHT) for x in (z + step, z, z - step))
+        up, here, down = (bed.contact(x, DIAMETER, WEIGHT) for x in (z + step, z, z - step))
         assert (up[0] - down[0]) / (2 * step) == pytest.approx(here[1], rel=1e-7, abs=1e-5)
         assert (up[1] - down[1]) / (2 * step) == pytest.approx(here[2], rel=1e-7)
 
@@ -44,11 +50,11 @@ def test_force_and_stiffness_of_the_bed_are_the_derivatives_of_its_potential():
     ("old", "new"), [(-0.2, 0.1), (0.1, -0.2), (-0.045, -0.035), (-0.04, 0.0), (0.0, 1e-3), (0.0, 1e-7), (-0.2, -0.1), (KNEE, KNEE + 2e-7)]
 )
 def test_mean_reaction_times_the_way_is_the_potential_exactly(old, new):
-    force, slope = seabed.mean_contact(old, new, DIAMETER, WEIGHT)
-    gain = seabed.contact(new, DIAMETER, WEIGHT)[0] - seabed.contact(old, DIAMETER, WEIGHT)[0]
+    force, slope = bed.mean_contact(old, new, DIAMETER, WEIGHT)
+    gain = bed.contact(new, DIAMETER, WEIGHT)[0] - bed.contact(old, DIAMETER, WEIGHT)[0]
     assert force * (new - old) == pytest.approx(gain, rel=1e-10, abs=1e-14)
     step = 1e-5
-    up, down = (seabed.mean_contact(old, new + s, DIAMETER, WEIGHT)[0] for s in (step, -step))
+    up, down = (bed.mean_contact(old, new + s, DIAMETER, WEIGHT)[0] for s in (step, -step))
     assert slope == pytest.approx((up - down) / (2 * step), rel=1e-3, abs=1e-2)  # the law has kinks in its curvature
 
 
@@ -74,10 +80,11 @@ def test_element_on_the_bed_has_the_gradient_of_its_potential():
         element.strains(rm, u, psi, h, share, strain)
         element.gradients(rm, u, psi, h, share, rows)
         points, wide = np.empty((4, 2)), np.empty(12)
-        energy, on_sag = loads.press(h, DIAMETER, WEIGHT, z1 + x[2], z1 + d[2] + x[8], strain[6], points)
+        lies = on_bed(), 0, h, z1 + x[2], z1 + d[2] + x[8], strain[6]
+        energy, on_sag = bed.potential(*lies), bed.press(*lies, points)
         assembly.expand(on_sag * rows[6], wide)
         vector += wide
-        loads.add_press(points, vector)
+        bed.add_press(points, vector)
         return energy
 
     force = np.zeros(12)
@@ -94,12 +101,12 @@ def test_element_on_the_bed_has_the_gradient_of_its_potential():
 STEP = 0.1  # s
 
 
-def mean_contact(bed, ends, new_z, dt=STEP):
+def mean_contact(law, ends, new_z, dt=STEP):
     vector, matrix = np.zeros(12), np.zeros((12, 12))
     row = np.zeros(9)
     old_z = np.array([-0.02, 0.01, 0.005])
-    sides = np.array(bed), old_z, np.array(new_z), ends, row, row
-    lost = loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, *sides, True, True, vector, matrix, SCRATCH)
+    sides = old_z, np.array(new_z), ends, row, row
+    lost = bed.add_mean_contact(on_bed(*law), 0, 10.0, dt, *sides, True, True, vector, matrix, SCRATCH)
     return lost, vector
 
 
@@ -156,8 +163,8 @@ def test_tangent_of_the_friction_is_the_derivative_by_the_way_slid():
     def sliding(velocities):
         vector, matrix = np.zeros(12), np.zeros((12, 12))
         z, row = np.array([-0.02, 0.01, 0.005]), np.zeros(9)
-        bed = np.array([0.0, 0.5, 1e-3])
-        loads.add_mean_contact(10.0, dt, DIAMETER, WEIGHT, bed, z, z, velocities, row, row, True, True, vector, matrix, SCRATCH)
+        law = on_bed(0.0, 0.5, 1e-3)
+        bed.add_mean_contact(law, 0, 10.0, dt, z, z, velocities, row, row, True, True, vector, matrix, SCRATCH)
         return vector, matrix
 
     _, tangent = sliding(ends)
@@ -169,9 +176,9 @@ def test_tangent_of_the_friction_is_the_derivative_by_the_way_slid():
 
 
 def test_drag_is_morisons_across_and_along():
-    across = hydrodynamics.drag((0.0, 3.0, 4.0), (1.0, 0.0, 0.0), 7.0, 200.0)[0]
+    across = drag.drag((0.0, 3.0, 4.0), (1.0, 0.0, 0.0), 7.0, 200.0)[0]
     np.testing.assert_allclose(across, [0, 200 * 5 * 3, 200 * 5 * 4], rtol=1e-14)
-    along = hydrodynamics.drag((-3.0, 0.0, 0.0), (1.0, 0.0, 0.0), 7.0, 200.0)[0]
+    along = drag.drag((-3.0, 0.0, 0.0), (1.0, 0.0, 0.0), 7.0, 200.0)[0]
     np.testing.assert_allclose(along, [-7 * 9, 0, 0], rtol=1e-14)
 
 
@@ -180,25 +187,25 @@ def test_drag_dissipates_for_any_velocity_and_direction():
     for _ in range(200):
         v, t = random.normal(size=3), random.normal(size=3)
         t /= np.linalg.norm(t)
-        force = np.array(hydrodynamics.drag(tuple(v), tuple(t), 7.0, 200.0)[0])
+        force = np.array(drag.drag(tuple(v), tuple(t), 7.0, 200.0)[0])
         assert force @ v > 0.0
         turn = rotation(rotation_vector_quaternion(random.normal(size=3)))
-        turned = hydrodynamics.drag(tuple(turn @ v), tuple(turn @ t), 7.0, 200.0)[0]
+        turned = drag.drag(tuple(turn @ v), tuple(turn @ t), 7.0, 200.0)[0]
         np.testing.assert_allclose(turned, turn @ force, rtol=1e-10, atol=1e-10)
 
 
 def test_drag_derivative_is_a_central_difference():
     v, t = np.array([0.3, -1.1, 0.6]), np.array([0.6, 0.0, 0.8])
-    _, a, b, c, v_n = hydrodynamics.drag(tuple(v), tuple(t), 7.0, 200.0)
+    _, a, b, c, v_n = drag.drag(tuple(v), tuple(t), 7.0, 200.0)
     slope = a * np.eye(3) + b * np.outer(t, t) + c * np.outer(v_n, v_n)
     for k in range(3):
         x = 1e-6 * np.eye(3)[k]
-        up, down = (np.array(hydrodynamics.drag(tuple(v + s * x), tuple(t), 7.0, 200.0)[0]) for s in (1, -1))
+        up, down = (np.array(drag.drag(tuple(v + s * x), tuple(t), 7.0, 200.0)[0]) for s in (1, -1))
         np.testing.assert_allclose(slope[:, k], (up - down) / 2e-6, rtol=1e-7, atol=1e-6)
 
 
 def test_drag_at_rest_is_zero_with_a_finite_derivative():
-    force, *coefficients = hydrodynamics.drag((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 7.0, 200.0)
+    force, *coefficients = drag.drag((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 7.0, 200.0)
     assert force == (0.0, 0.0, 0.0)
     assert coefficients[:3] == [0.0, 0.0, 0.0]
 
@@ -208,7 +215,7 @@ def element_drag(ends, current, d=(10.0, 0.0, 0.0), q1=(1.0, 0.0, 0.0, 0.0), q2=
     rm, u, psi = element.frame(tuple(q1), tuple(q2), tuple(d))
     levels = np.array([-800.0, 0.0])
     flow = np.array([current, current], dtype=float)
-    power = loads.add_drag(
+    power = drag.add_mean_drag(
         rm, u, psi, 10.0, np.array([7.0, 200.0]), ends, np.array([-50.0, -40.0]), levels, flow, rate, True, vector, matrix, SCRATCH
     )
     return power, vector, matrix
@@ -235,7 +242,7 @@ def test_drag_on_a_bent_element_in_rigid_rotation_is_that_of_its_arc(axis):
         tangent = frame @ (np.eye(3)[0] + np.cross((x - 0.5) * psi, np.eye(3)[0]))
         tangent /= np.linalg.norm(tangent)
         v = np.cross(axis, x * d + x * (1 - x) * sag)
-        power += 5.0 * np.dot(hydrodynamics.drag(tuple(v), tuple(tangent), 7.0, 200.0)[0], v)
+        power += 5.0 * np.dot(drag.drag(tuple(v), tuple(tangent), 7.0, 200.0)[0], v)
     assert lost == pytest.approx(power, rel=1e-12)
     assert vector @ ends.ravel() == pytest.approx(power, rel=1e-12)
 
@@ -257,7 +264,7 @@ def test_current_on_an_arc_is_that_at_the_depth_of_its_points():
     levels, flow = np.array([-51.0, -49.0]), np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
     vector, matrix = np.zeros(12), np.zeros((12, 12))
     depths = np.array([-50.0, -50.0])
-    loads.add_drag(*frame, 10.0, np.array([7.0, 200.0]), np.zeros((2, 6)), depths, levels, flow, 0.0, True, vector, matrix, SCRATCH)
+    drag.add_mean_drag(*frame, 10.0, np.array([7.0, 200.0]), np.zeros((2, 6)), depths, levels, flow, 0.0, True, vector, matrix, SCRATCH)
     assert vector[1] + vector[7] == pytest.approx(-10.0 * 200.0 * (2.0 / 6.0) ** 2, rel=1e-12)  # x (1 - x) = 1 / 6 at the Gauss points
 
 
@@ -277,11 +284,11 @@ def test_element_drag_tangent_is_the_derivative_with_respect_to_velocity():
 
 def test_current_is_linear_between_levels_and_constant_beyond():
     levels, speeds = np.array([-800.0, -100.0, 0.0]), np.array([[0.0, 0.8, 0.0], [0.0, 0.5, 0.1], [0.0, 0.0, 0.0]])
-    assert hydrodynamics.current_at(-900.0, levels, speeds) == (0.0, 0.8, 0.0)
-    assert hydrodynamics.current_at(5.0, levels, speeds) == (0.0, 0.0, 0.0)
+    assert current.current_at(-900.0, levels, speeds) == (0.0, 0.8, 0.0)
+    assert current.current_at(5.0, levels, speeds) == (0.0, 0.0, 0.0)
     for z in (-800.0, -450.0, -100.0, -30.0, 0.0):
         expected = [np.interp(z, levels, speeds[:, k]) for k in range(3)]
-        np.testing.assert_allclose(hydrodynamics.current_at(z, levels, speeds), expected, atol=1e-15)
+        np.testing.assert_allclose(current.current_at(z, levels, speeds), expected, atol=1e-15)
 
 
 def test_current_starts_ramps_and_reverses_when_told():

@@ -316,7 +316,7 @@ def test_nearly_vertical_pipe_agrees_with_the_boundary_value_problem():
 def test_line_lying_on_the_bed_with_its_top_on_it_is_carried_by_the_bed():
     """Top at z = 0: no catenary hangs there; the bed carries every node at z = 0, the ends nothing of the weight."""
     pipe, found, _ = started(PipeParameters(top="pinned", top_quaternion=HANGING, top_position=(1199.99, 0.0, 0.0), seabed=Seabed()))
-    assert abs(found.top[2]) < 1e-9 * (pipe.line.weight @ pipe.line.length)
+    assert abs(found.top[2]) < 1e-9 * (pipe.line.loads.weight @ pipe.line.length)
     assert abs(found.position[:, 2]).max() < 1e-9
 
 

@@ -123,7 +123,7 @@ def test_a_line_that_ends_below_where_it_begins_is_the_one_that_begins_there():
 def test_an_upright_riser_stretched_beyond_its_length_is_a_bar_under_its_weight(span):
     """T at mid length = EA (span / L - 1), and half the weight more and less at its ends."""
     pipe, found = at_rest(pinned(500.0, (0.0, 0.0, -span), P16, 600.0))
-    weight = pipe.line.weight @ pipe.line.length
+    weight = pipe.line.loads.weight @ pipe.line.length
     pull = P16.stiffness[0] * (span / 500.0 - 1.0)
     if pull > 0.5 * weight:
         np.testing.assert_allclose(-found.top[2], pull + 0.5 * weight, rtol=1e-7)
@@ -134,7 +134,7 @@ def test_a_line_of_hardly_any_stiffness_stretched_across_the_water_is_the_elasti
     """Span 500.04 m of 500 m, inclined: T along the chord of the elastic catenary, by its two end conditions (Irvine 1981)."""
     section = replace(P16, bending_stiffness=1.0)
     pipe, found = at_rest(pinned(500.0, (300.0, 0.0, -400.04), section, 600.0))
-    w, axial = pipe.line.weight[0], section.stiffness[0]
+    w, axial = pipe.line.loads.weight[0], section.stiffness[0]
     position = elastic_catenary(w, axial, 500.0, found.top[0], -found.top[2])
     np.testing.assert_allclose(position, [300.0, 400.04], atol=1e-5)
 
@@ -162,7 +162,7 @@ def test_modules_float_above_the_bed_and_carry_their_part_of_the_line():
     assert clear[middle].all()
     assert found.position[middle, 2].min() < found.position[np.searchsorted(pipe.s, 800.0), 2]
     first = int(np.flatnonzero(clear)[0])
-    carried = pipe.line.weight[first:] @ pipe.line.length[first:]
+    carried = pipe.line.loads.weight[first:] @ pipe.line.length[first:]
     force = pipe.section_forces(pipe.at_rest(found))
     low = pipe.spatial_top(replace_top(pipe, found, first), np.array([force.tension[first], *force.shear[first], 0.0, 0.0, 0.0]))
     assert -found.top[2] + low[2] == pytest.approx(carried, rel=1e-3)
@@ -178,10 +178,10 @@ def replace_top(pipe, found, node):
 
 def test_the_bed_under_modules_is_that_of_the_heaviest_section_or_of_the_weight_given():
     weight = lazy_wave(True).weight(P16)
-    assert Pipe(lazy_wave(True)).line.bearing == pytest.approx(weight)
-    assert Pipe(lazy_wave(True, reference=300.0)).line.bearing == pytest.approx(300.0)
+    assert Pipe(lazy_wave(True)).line.loads.bed.bearing == pytest.approx(weight)
+    assert Pipe(lazy_wave(True, reference=300.0)).line.loads.bed.bearing == pytest.approx(300.0)
     floats = pinned(1200.0, (700.0, 0.0, -500.0), replace(P16, mass=80.0), seabed=Seabed())
-    assert Pipe(floats).line.bearing == pytest.approx(-floats.weight(floats.section))
+    assert Pipe(floats).line.loads.bed.bearing == pytest.approx(-floats.weight(floats.section))
 
 
 def test_a_bed_under_a_line_without_weight_needs_the_weight_its_stiffness_follows_from():

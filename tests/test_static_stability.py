@@ -4,17 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from pipe_helpers import STILL, assembled, bar, pitch, rotation, static_system, straight, turned
+from pipe_helpers import STILL, assembled, bar, loaded, pitch, rotation, static_system, straight, turned
 from scipy.linalg import eigh
 from statics_grid import scenes
 
 from pipe_fmu import Pipe, PipeUnit
 from pipe_fmu.element import frame
 from pipe_fmu.line import Water
-from pipe_fmu.loads import add_drag
+from pipe_fmu.loads.drag import add_mean_drag, add_static_drag
 from pipe_fmu.relaxation import DESCENTS, TOLERANCE, _downward, _step, descend, newton, relax
 from pipe_fmu.static_balance import Balance, Factors, Scales, _largest_eigenvalues, limited, moved
-from pipe_fmu.static_drag import add_static_drag
 
 SCENES = scenes()
 
@@ -84,7 +83,7 @@ def drag_at(x, fresh):
     if fresh:
         add_static_drag(*sides, *depths, levels, flow, vector, matrix)
     else:
-        add_drag(*sides, np.zeros((2, 6)), depths, levels, flow, 0.0, False, vector, matrix, np.empty((2, 3, 12)))
+        add_mean_drag(*sides, np.zeros((2, 6)), depths, levels, flow, 0.0, False, vector, matrix, np.empty((2, 3, 12)))
     return vector, matrix
 
 
@@ -141,7 +140,8 @@ def test_a_unit_that_starts_in_an_equilibrium_that_is_not_stable_says_so(monkeyp
 
 def at_rest(current, **changes):
     """Balance of a taut line in a current [m/s] across it, at the equilibrium in still water; it is at rest without one."""
-    _, line = bar(20.0, 6, axial=1e5, shear=1e5, torsion=1e5, bending=100.0, weight=5.0, drag=np.full((5, 2), 40.0), **changes)
+    _, line = bar(20.0, 6, axial=1e5, shear=1e5, torsion=1e5, bending=100.0, weight=5.0, **changes)
+    line = loaded(line, drag=np.full((5, 2), 40.0))
     position, quaternion = straight(np.linspace(0.0, 20.2, 6), (0.8, 0.0, -0.6), pitch(math.asin(0.6)))
     still = newton(Balance(line, STILL, Scales(line), (position, quaternion))).balance
     water = Water(np.array([-30.0, 0.0]), np.array([[0.0, current, 0.0], [0.1, 0.3 * current, 0.0]]), True)
@@ -273,10 +273,10 @@ def test_a_limited_move_turns_no_section_by_more_and_keeps_its_direction():
 def test_a_line_is_measured_by_its_weight():
     """Forces by all of it, moments by the longest element times that; a node of length l by its share W, turning by W l^2 / 12."""
     _, line = bar(9.0, 3, axial=1e5, shear=1e5, torsion=80.0, bending=100.0)
-    line = line._replace(weight=np.array([2.0, -4.0]), length=np.array([3.0, 6.0]))
+    line = loaded(line._replace(length=np.array([3.0, 6.0])), weight=np.array([2.0, -4.0]))
     own = np.array([1.5, 4.5, 3.0])
     for weight, load in ((1.0, 30.0 / 9.0), (0.0, 100.0 / 9.0**3)):  # a line without weight by what buckles it, EI / L^2
-        scales = Scales(line._replace(weight=weight * line.weight))
+        scales = Scales(loaded(line, weight=weight * line.loads.weight))
         assert scales.force == pytest.approx(9.0 * load)
         np.testing.assert_allclose(scales.arm, [1.0] * 3 + [6.0] * 3)
         np.testing.assert_allclose(scales.metric[:, 0], load * own)

@@ -20,7 +20,7 @@ def test_a_line_finds_a_stable_equilibrium_with_its_top_hanging_and_turned(scene
     assert hung.stable
     assert held.converged
     assert held.stable
-    weight = pipe.line.weight @ pipe.line.length
+    weight = pipe.line.loads.weight @ pipe.line.length
     if pipe.parameters.seabed is None and pipe.parameters.environment.current is None:  # what hangs is held by its ends
         assert -(held.top[2] + held.foot[2]) == pytest.approx(weight, rel=1e-6)
 

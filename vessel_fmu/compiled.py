@@ -17,10 +17,10 @@ from numba import config, njit
 
 def drop_stale_cache(package: Path) -> int:
     """Remove numba's cache indices of the package folder if one is older than a source; return how many were removed."""
-    indices = list(package.glob("__pycache__/*.nbi"))
+    indices = list(package.rglob("__pycache__/*.nbi"))
     if not os.access(package, os.W_OK):
         return 0  # numba keeps its cache elsewhere
-    newest = max(source.stat().st_mtime for source in package.glob("*.py"))
+    newest = max(source.stat().st_mtime for source in package.rglob("*.py"))
     if all(index.stat().st_mtime >= newest for index in indices):
         return 0
     for index in indices:

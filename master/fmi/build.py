@@ -124,7 +124,7 @@ def compile_kernels(recipe: Recipe, fmu: Path) -> None:
     A process that compiles kernels binds them otherwise than one that loads them, with other round-off: the first run would
     differ from the later ones in the last bits. Raises RunError if the FMU does not start.
     """
-    if not any((cache_folder("units") / recipe.bundle).glob("__pycache__/*.nbi")):
+    if not any((cache_folder("units") / recipe.bundle).rglob("*.nbi")):
         with zipfile.ZipFile(fmu) as archive:
             _kernels(recipe, {name: archive.read(name) for name in archive.namelist() if name.startswith("resources/")})
 
@@ -216,7 +216,7 @@ def _kernels(recipe: Recipe, contents: Mapping[str, bytes]) -> dict[str, bytes]:
             place.write_bytes(content)
         step = recipe.experiment.get("step_size", 0.01)
         compiled = portable.kernels(Path(folder, "resources"), cache_folder("units") / recipe.bundle, step)
-    return {f"resources/{recipe.bundle}/__pycache__/{name}": content for name, content in compiled.items()}
+    return {f"resources/{recipe.bundle}/{name}": content for name, content in compiled.items()}
 
 
 @contextlib.contextmanager

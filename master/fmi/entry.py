@@ -99,7 +99,7 @@ def _mend(place: Path, bundled: Path) -> None:
         with tempfile.TemporaryDirectory(dir=place.parent) as unfinished:
             copy = Path(unfinished, source.name)
             _copy(source, copy)
-            target.parent.mkdir(exist_ok=True)
+            target.parent.mkdir(parents=True, exist_ok=True)
             copy.replace(target)
 
 

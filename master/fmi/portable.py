@@ -75,7 +75,7 @@ def archive(folder: Path) -> Path:
 
 
 def kernels(resources: Path, unit: Path, step: float) -> dict[str, bytes]:
-    """Files of numba's cache, by name, in the folder `unit` where the FMU unpacked in `resources` settles, after one start of it.
+    """Files of numba's cache, by their places, in the folder `unit` where the FMU unpacked in `resources` settles, after one start of it.
 
     Raises RunError if it does not start.
     """
@@ -83,7 +83,7 @@ def kernels(resources: Path, unit: Path, step: float) -> dict[str, bytes]:
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise RunError(f"the FMU does not start: {' '.join(done.stderr.split())[-1000:]}")
-    return {path.name: path.read_bytes() for path in sorted(unit.glob("__pycache__/*.nb[ci]"))}
+    return {path.relative_to(unit).as_posix(): path.read_bytes() for path in sorted(unit.rglob("*.nb[ci]"))}
 
 
 def _collect(tree: Path) -> None:

@@ -1,27 +1,6 @@
-"""Quadratic drag on a slender section, eqs. (29)-(31), for a section symmetric about t1 (D_2 = D_3)."""
+"""Velocity of the water at a depth: the current's profile, linear between levels."""
 
-import math
-
-from .compiled import inner
-from .so3 import add, dot, scale
-
-_STILL = 1e-300  # of a square of a speed
-
-
-@inner
-def drag(v_r, tangent, tangential, normal):
-    """Drag force per length on the water [N/m] for relative velocity `v_r` and unit tangent t1, all in e.
-
-    `tangential`, `normal` are rho d D_1 / 2 and rho d D_2 / 2 [N s^2/m^3]. The pipe feels minus this force; force . v_r >= 0.
-    Also returns the coefficients (a, b, c) of the derivative  d force / d v_r = a I + b t t^T + c v_n v_n^T,  and v_n.
-    """
-    v_t = dot(v_r, tangent)
-    v_n = add(v_r, scale(-v_t, tangent))
-    speed = math.sqrt(dot(v_n, v_n))
-    force = add(scale(normal * speed, v_n), scale(tangential * math.fabs(v_t) * v_t, tangent))
-    a = normal * speed
-    c = a / max(dot(v_n, v_n), _STILL)
-    return force, a, 2.0 * tangential * math.fabs(v_t) - a, c, v_n
+from ..compiled import inner
 
 
 @inner
