@@ -21,7 +21,7 @@ from master.fmi.schema import build
 from master.scene import Scene
 from pipe_fmu import Pipe, PipeParameters, resolve
 from pipe_fmu.environment import Environment
-from pipe_fmu.statics import Equilibrium
+from pipe_fmu.statics.solve import Equilibrium
 from vessel_fmu.parameters import Start, VesselParameters
 from vessel_fmu.vessel import Vessel
 

@@ -2,17 +2,17 @@
 
 from typing import NamedTuple
 
-from .columns import column, columns
 from .arrays import Array
 from .compiled import kernel
 from .loads import Loads, loads_columns
+from .simd.columns import column, columns
 
 
 class Line(NamedTuple):
     """Constant data of n nodes and n - 1 elements."""
 
     length: Array  # (n-1,) h [m]
-    stiffness: Array  # (n-1, 6) EA, K_2, K_3 [N], GJ, EI_2, EI_3 [N m^2]; K the chord's shear stiffness (element.py)
+    stiffness: Array  # (n-1, 6) EA, K_2, K_3 [N], GJ, EI_2, EI_3 [N m^2]; K the chord's shear stiffness (element/strains.py)
     share: Array  # (n-1, 2) p_2, p_3
     loads: Loads
     mass: Array  # (n,) lumped m_P times length [kg]
@@ -35,7 +35,7 @@ class Water(NamedTuple):
 
 
 def shear_stiffness(shear: Array, bending: Array, length: Array) -> tuple[Array, Array]:
-    """Chord shear stiffness K [N] and bending share p of elements: 1/K = 1/GA + h^2/(12 EI) (see element.py)."""
+    """Chord shear stiffness K [N] and bending share p of elements: 1/K = 1/GA + h^2/(12 EI) (see element/strains.py)."""
     flexibility = length**2 / (12.0 * bending)
     stiffness = 1.0 / (1.0 / shear + flexibility)
     return stiffness, flexibility * stiffness
@@ -43,7 +43,7 @@ def shear_stiffness(shear: Array, bending: Array, length: Array) -> tuple[Array,
 
 @kernel
 def line_columns(line):
-    """The line with its arrays as columns (columns.py)."""
+    """The line with its arrays as columns (simd/columns.py)."""
     n = line.mass.shape[0]
     return Line(
         column(line.length, n, 1.0),

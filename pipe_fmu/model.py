@@ -6,13 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import catenary, mesh, section_forces, statics
+from . import mesh
 from .arrays import Array
-from .element import ROWS
+from .element.strains import ROWS
 from .line import Line, Water, shear_stiffness
 from .loads import loads_of
 from .parameters import PipeParameters, Section
-from .step_kernel import element_strains
+from .results import section_forces
+from .statics import catenary
+from .statics.solve import solve
+from .step.system import element_strains
 
 _PROBE = (4, 8)  # elements of the probing mesh for one of the mesh to be made; the finer where the other finds no equilibrium,
 _PROBE_LIMIT = 2000  # as long as there are fewer than these
@@ -84,7 +87,7 @@ def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
     """Nodal section forces (n, 6), material components, of the equilibrium on nodes `s` (n,), if there is one."""
     line, calm = _line(parameters, s), water(parameters, 0.0)
     attitude = np.array(parameters.top_quaternion)
-    found = statics.solve(line, s, calm, parameters.top_position, attitude if attitude.any() else None)
+    found = solve(line, s, calm, parameters.top_position, attitude if attitude.any() else None)
     if not found.converged:
         return None
     strain = np.empty((len(s) - 1, ROWS))

@@ -2,13 +2,15 @@
 
 import numpy as np
 
-from . import integrator, model, section_forces, statics, wall_stress
+from . import model
 from .arrays import Array
-from .integrator import STIFF, PipeState, StepResult
+from .maths.so3 import matrix
 from .parameters import PipeParameters
-from .section_forces import SectionForces
-from .so3 import matrix
-from .statics import Equilibrium
+from .results import section_forces, wall_stress
+from .results.section_forces import SectionForces
+from .statics.solve import Equilibrium, solve
+from .step import integrator
+from .step.integrator import STIFF, PipeState, StepResult
 
 
 class Pipe:
@@ -27,7 +29,7 @@ class Pipe:
 
     def equilibrium(self, top: tuple[float, float, float], attitude: Array | None, time: float = 0.0) -> Equilibrium:
         """Static equilibrium with the top at `top` (3,) [m], e, its section at `attitude` (4,), or as it hangs if None."""
-        return statics.solve(self.line, self.s, self.water(time), top, attitude)
+        return solve(self.line, self.s, self.water(time), top, attitude)
 
     def start(self, time: float) -> tuple[Equilibrium, PipeState]:
         """Equilibrium at the parameters' own top pose, and the state of rest in it."""

@@ -10,7 +10,7 @@ from .arrays import Array
 from .model import resolve
 from .parameters import PipeParameters
 from .pipe import Pipe
-from .state import LEDGER
+from .step.state import LEDGER
 
 Port = tuple[int, str | tuple[str, ...], str]
 

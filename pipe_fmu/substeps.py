@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .arrays import Array
-from .integrator import PipeState, StepResult
+from .step.integrator import PipeState, StepResult
 
 DIVISOR = 3
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipe_fmu import PipeParameters, Seabed, Section, catenary
+from pipe_fmu import PipeParameters, Seabed, Section
 from pipe_fmu.environment import Current, Environment
+from pipe_fmu.statics import catenary
 
 TOLERANCES = (1e-2, 3e-3, 1e-3, 3e-4)
 

@@ -17,8 +17,8 @@ from statics_grid import HOSE
 
 from pipe_fmu import Pipe, PipeParameters, Seabed, Section
 from pipe_fmu.environment import Current, Environment
-from pipe_fmu.static_balance import Scales
-from pipe_fmu.statics import Equilibrium, equilibrium
+from pipe_fmu.statics.balance import Scales
+from pipe_fmu.statics.solve import Equilibrium, equilibrium
 
 KINDS = ("steel", "cable", "hose", "buoyant", "neutral", "modules")
 FORCE, MOMENT = 0.02, 0.05  # errors allowed on 48 nodes, of the top's force and of the largest bending moment

@@ -12,7 +12,7 @@ from pipe_helpers import HANGING
 from statics_grid import LINES, differences, figures
 
 from pipe_fmu import Pipe, PipeParameters
-from pipe_fmu.element import frame
+from pipe_fmu.element.strains import frame
 from pipe_fmu.environment import Environment
 
 

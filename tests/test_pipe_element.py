@@ -8,8 +8,10 @@ from pipe_helpers import rotation, rotation_vector_quaternion, times
 from scipy.linalg import expm
 from scipy.special import bernoulli, factorial
 
-from pipe_fmu import assembly, element, geometric_stiffness, relative_rotation
+from pipe_fmu.element import assembly, geometric_stiffness
+from pipe_fmu.element import strains as element
 from pipe_fmu.line import shear_stiffness
+from pipe_fmu.maths import relative_rotation
 
 LENGTH = 7.0
 SHARE = np.array([0.91, 0.64])

@@ -8,9 +8,15 @@ from pipe_helpers import P16, assembled, bar, loaded, rotation, started, straigh
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
-from pipe_fmu import PipeParameters, block_tridiagonal, ends, newton, section_forces, stability, step_kernel, wall_stress
+from pipe_fmu import PipeParameters
+from pipe_fmu.element import ends
 from pipe_fmu.environment import Environment
 from pipe_fmu.line import Water
+from pipe_fmu.maths import block_tridiagonal
+from pipe_fmu.results import section_forces, wall_stress
+from pipe_fmu.statics import stability
+from pipe_fmu.step import newton
+from pipe_fmu.step import system as step_kernel
 
 
 def test_elimination_exchanges_rows_where_a_pivot_would_vanish():

@@ -8,9 +8,11 @@ from numba import njit
 from numba.core.errors import TypingError
 from pipe_helpers import bar, loaded
 
-from pipe_fmu.columns import fill_straight, line_columns, room
-from pipe_fmu.lane_arrays import grid, group, lane, row, rows_of_six, six
-from pipe_fmu.lanes import WIDTH, above, below, lane_by_lane, largest, total
+from pipe_fmu.line import line_columns
+from pipe_fmu.loads import Bed
+from pipe_fmu.simd.columns import fill_straight, room
+from pipe_fmu.simd.lane_arrays import grid, group, lane, row, rows_of_six, six
+from pipe_fmu.simd.lanes import WIDTH, above, below, lane_by_lane, largest, total
 
 inner = njit(error_model="numpy")  # as the package's own, but never taken from a cache
 A = np.array([1.5, -2.0, 0.25, -0.5, 3.0, -4.5, 0.125, -8.0])

@@ -7,7 +7,8 @@ import pytest
 from pipe_helpers import rotation, rotation_vector_quaternion, times
 from reference_bvp import bed_reaction
 
-from pipe_fmu import assembly, element
+from pipe_fmu.element import assembly
+from pipe_fmu.element import strains as element
 from pipe_fmu.environment import Current
 from pipe_fmu.loads import bed, current, drag
 

@@ -14,7 +14,8 @@ from pipe_helpers import STILL, bar, dense_equilibrium, free_step, rotation, rot
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pipe_fmu import section_forces, step_kernel
+from pipe_fmu.results import section_forces
+from pipe_fmu.step import system as step_kernel
 
 LENGTH, MASS, EA, GA, GJ, EI, TIME = 10.0, 2.0, 1e5, 1e9, 80.0, 100.0, 0.1  # TIME: of the internal damping
 INERTIA = np.array([0.4, 0.2, 0.2])

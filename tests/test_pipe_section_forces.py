@@ -9,7 +9,7 @@ import reference_bvp as reference
 from pipe_helpers import HANGING, P16, SECTIONS, TANGENT, TANGENT_ATTITUDE, march, pitch, rotation, sea, started
 
 from pipe_fmu import PipeParameters, PipeUnit, Seabed
-from pipe_fmu.section_forces import SectionForces
+from pipe_fmu.results.section_forces import SectionForces
 
 ANGLE = math.radians(67.380135)
 

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from pipe_fmu import AddedMass, Seabed
-from pipe_fmu.section_forces import bar_factors
+from pipe_fmu.results.section_forces import bar_factors
 
 STEP, DURATION, EVERY = 0.04, 36.0, 20
 CASES = {

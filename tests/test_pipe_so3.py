@@ -7,7 +7,7 @@ import pytest
 from pipe_helpers import assembled, rotation, rotation_vector_quaternion, times
 from scipy.linalg import expm
 
-from pipe_fmu import block_tridiagonal, so3
+from pipe_fmu.maths import block_tridiagonal, so3
 
 ANGLES = [0.0, 1e-9, 1e-5, 1.9e-4, 2.1e-4, 1e-3, 0.3, 1.0, 2.0, 3.0, 3.14]
 AXIS = np.array([0.36, -0.48, 0.8])

@@ -26,8 +26,10 @@ from pipe_helpers import (
     straight,
 )
 
-from pipe_fmu import AddedMass, PipeParameters, PipeUnit, Seabed, integrator, model, step_kernel
-from pipe_fmu.integrator import WORKS
+from pipe_fmu import AddedMass, PipeParameters, PipeUnit, Seabed, model
+from pipe_fmu.step import integrator
+from pipe_fmu.step import system as step_kernel
+from pipe_fmu.step.integrator import WORKS
 
 TWO = (replace(P16, length=500.0), replace(P16, length=700.0, wall_thickness=0.0254, coating_thickness=0.02, coating_density=2000.0))
 BED = {"seabed": Seabed(damping=1.0, friction=0.5), "top_position": (780.0, 0.0, -800.0)}

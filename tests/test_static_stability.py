@@ -9,11 +9,11 @@ from scipy.linalg import eigh
 from statics_grid import scenes
 
 from pipe_fmu import Pipe, PipeUnit
-from pipe_fmu.element import frame
+from pipe_fmu.element.strains import frame
 from pipe_fmu.line import Water
 from pipe_fmu.loads.drag import add_mean_drag, add_static_drag
-from pipe_fmu.relaxation import DESCENTS, TOLERANCE, _downward, _step, descend, newton, relax
-from pipe_fmu.static_balance import Balance, Factors, Scales, _largest_eigenvalues, limited, moved
+from pipe_fmu.statics.balance import Balance, Factors, Scales, _largest_eigenvalues, limited, moved
+from pipe_fmu.statics.relaxation import DESCENTS, TOLERANCE, _downward, _step, descend, newton, relax
 
 SCENES = scenes()
 

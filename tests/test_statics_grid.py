@@ -54,7 +54,7 @@ def test_a_turned_line_of_the_grid_is_that_of_the_boundary_value_problem(number)
     """Top section turned in the line's plane by 30 or 60 degrees either way, on 64 nodes placed for it: the top's force, and its moment.
 
     The largest error, 9e-5 for the top of a taut line turned by 30 degrees (99: sheared by 3e-3), is that of measuring the extension along
-    the centreline and not along t_1, as element.py states; 768 nodes leave 7.6e-5.
+    the centreline and not along t_1, as element/strains.py states; 768 nodes leave 7.6e-5.
 
     A short, stiff line that is pressed together (93) rests bent to either side, and which it is depends on its mesh: not among these.
     """

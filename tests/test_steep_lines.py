@@ -9,9 +9,11 @@ from pipe_helpers import STILL, bar, pitch, started
 from statics_grid import differences, figures
 from steep_lines import equilibrium, least_advance, lines
 
-from pipe_fmu import Pipe, PipeParameters, PipeUnit, Section, integrator, statics
+from pipe_fmu import Pipe, PipeParameters, PipeUnit, Section
 from pipe_fmu.environment import Environment
-from pipe_fmu.static_balance import Scales
+from pipe_fmu.statics import solve as statics
+from pipe_fmu.statics.balance import Scales
+from pipe_fmu.step import integrator
 
 PLUMB = PipeParameters(
     length=1200.0,

@@ -16,8 +16,8 @@ from scipy.interpolate import CubicSpline
 from master.benchmarks.line import CASES, PIPE
 from master.errors import RunError
 from pipe_fmu import Pipe
-from pipe_fmu.integrator import PipeState
-from pipe_fmu.section_forces import SectionForces
+from pipe_fmu.results.section_forces import SectionForces
+from pipe_fmu.step.integrator import PipeState
 
 COUNTS, REFERENCE = (24, 48, 96, 192), 512
 MESHES: tuple[Literal["adapted", "uniform"], ...] = ("adapted", "uniform")

@@ -14,8 +14,8 @@ from master.benchmarks.histories import SAMPLE, Histories, LineCase, Setting, in
 from master.benchmarks.through_fmus import apart, march
 from master.errors import RunError
 from pipe_fmu import Pipe, PipeParameters
-from pipe_fmu.integrator import PipeState
-from pipe_fmu.so3 import matrix
+from pipe_fmu.maths.so3 import matrix
+from pipe_fmu.step.integrator import PipeState
 
 _SAME = 1e-6  # m: nodes of the FMU and of the step in-process, with the same nodes and steps
 

@@ -20,7 +20,7 @@ import numpy as np
 from master.benchmarks.histories import SAMPLE, Histories, LineCase, Setting, instants
 from pipe_fmu import Pipe, PipeParameters
 from pipe_fmu.compiled import kernel
-from pipe_fmu.so3 import matrix
+from pipe_fmu.maths.so3 import matrix
 
 _NEWTON = 1e-5  # relative tolerance; 1e-8, the default, takes half as long again and gives the same errors
 _SPECTRAL_RADIUS = 0.9  # Exudyn's default

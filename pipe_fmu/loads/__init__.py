@@ -1,21 +1,23 @@
 """The distributed loads on an element, one module each: its law beside its potential or its power, its part of a step, of statics and of
 what is recovered.
 
-A load that is added gets a module, a field of `Loads` and a line in each function here; works, energies, ports and ledger follow from the modules'
-`LEDGER`. Every function takes what all loads may need, and calls them in one order.
+A load that is added gets a module, a field of `Loads` and a line in each function here; works, energies and ports follow from
+the modules' `LEDGER`. Every function takes what all loads may need, and calls them in one order.
 """
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ..assembly import expand
-from ..columns import column, columns
 from ..arrays import Array
 from ..compiled import inner, kernel
-from ..element import STRAINS
-from ..lane_arrays import group, lane
+from ..element.assembly import expand
+from ..element.strains import STRAINS
+from ..simd.columns import column, columns
+from ..simd.lane_arrays import group, lane
 from . import bed, drag, weight
 from .bed import Bed, Seabed
+
+__all__ = ["Bed", "Loads", "Seabed"]
 
 LEDGER = weight.LEDGER | drag.LEDGER | bed.LEDGER  # ports of energies and works: what they are, and the least they can be
 _WORKS = [port for port in LEDGER if not port.endswith("_energy")]
@@ -53,7 +55,7 @@ def loads_of(parameters: Any, section: Callable[[Callable[[Any], object]], Array
 
 @kernel
 def loads_columns(loads, n):
-    """The loads with their arrays as columns (columns.py), of no effect behind the last element."""
+    """The loads with their arrays as columns (simd/columns.py), of no effect behind the last element."""
     return Loads(column(loads.weight, n, 0.0), columns(loads.drag, n, 0.0), bed.bed_columns(loads.bed, n))
 
 
@@ -103,7 +105,7 @@ def add_mean_loads(line, water, first, count, h, old, new, middle, ends, mean, f
     """Add minus the mean loads on `count` elements from `first` on, over a step of h [s], to `vector` (12,) and, if `fresh`, their tangent
     to `matrix` (12, 12); works into `sums`.
 
-    old, new: as in step_kernel.assemble; middle: frame half way; ends (2, 6): mean velocities of the nodes; mean, final (7, 9): gradients
+    old, new: as in step.system.assemble; middle: frame half way; ends (2, 6): mean velocities of the nodes; mean, final (7, 9): gradients
     of strains and sag, averaged over the step and at its end; sharp: see `bed.add_mean_contact`; scratch: two (3, 12).
     """
     a, b = group(first), group(first + 1)

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..assembly import add_outer, expand
-from ..checks import check_fields, number
-from ..columns import column
 from ..arrays import Array
+from ..checks import check_fields, number
 from ..compiled import inner, kernel
+from ..element.assembly import add_outer, expand
+from ..simd.columns import column
 
 LEDGER: dict[str, tuple[str, float | None]] = {
     "contact_energy": ("potential energy of the bed", 0.0),
@@ -67,7 +67,7 @@ def bed_of(seabed: Seabed | None, bearing: Array, diameter: Array) -> Bed:
 
 @kernel
 def bed_columns(bed, n):
-    """The bed with its arrays as columns (columns.py)."""
+    """The bed with its arrays as columns (simd/columns.py)."""
     return Bed(column(bed.bearing, n, 0.0), column(bed.diameter, n, 1.0), bed.damping, bed.friction, bed.friction_speed)
 
 

@@ -4,14 +4,14 @@ It has no potential. Its power on the relative velocity, <v_r, f_D> >= 0, is dis
 (the paper's eq. (82) takes both as one, which has no sign).
 
 Over a step the force is that of the mean velocity half way; at rest it is that of the current alone, with its exact tangent: along the
-nodes' mean spin beta and spin difference mu, d(bow) = beta_m x bow + A^-1 mu and beta_m = beta - b bow x mu (relative_rotation.py).
+nodes' mean spin beta and spin difference mu, d(bow) = beta_m x bow + A^-1 mu and beta_m = beta - b bow x mu (maths/relative_rotation.py).
 """
 
 import math
 
 from ..compiled import inner
-from ..relative_rotation import mid_spin, relative_turn
-from ..so3 import add, apply, cross, dot, scale, subtract
+from ..maths.relative_rotation import mid_spin, relative_turn
+from ..maths.so3 import add, apply, cross, dot, scale, subtract
 from .current import current_at, current_slope
 from .points import add_linked, linked_forces, linked_motion, sag_rate
 

@@ -7,7 +7,7 @@ the power at the points, exactly.
 """
 
 from ..compiled import inner
-from ..so3 import add, cross, scale
+from ..maths.so3 import add, cross, scale
 
 
 @inner

@@ -2,41 +2,12 @@
 
 import numpy as np
 
-from .assembly import add_matrix, add_vector, clear, expand, expand_matrix
-from .compiled import inner, kernel
-from .element import ROWS, STRAINS, frame, gradients, strains
-from .geometric_stiffness import geometric_stiffness
-from .loads import NO_ENERGY, add_static_loads, potentials, press_sag, summed
-
-INSIDE_OUT = "turned inside out"  # see `inverted`
-
-
-@inner
-def vector_of(columns, k, at):
-    """Components k, k + 1, k + 2 of columns at a node or a group of nodes."""
-    return (columns[k, at], columns[k + 1, at], columns[k + 2, at])
-
-
-@inner
-def attitude(quaternion, at):
-    """Quaternion, from columns, of a node or a group of nodes."""
-    return (quaternion[0, at], quaternion[1, at], quaternion[2, at], quaternion[3, at])
-
-
-@inner
-def chord(position, a, b):
-    """phi_b - phi_a from columns of positions, or of displacements."""
-    return (position[0, b] - position[0, a], position[1, b] - position[1, a], position[2, b] - position[2, a])
-
-
-@kernel
-def inverted(position, quaternion):
-    """Whether an element is turned inside out: its chord points against its sections, <d_S phi, R e1> <= 0 in eq. (1)."""
-    for e in range(position.shape[0] - 1):
-        _, u, _ = frame(attitude(quaternion.T, e), attitude(quaternion.T, e + 1), chord(position.T, e, e + 1))
-        if not u[0] > 0.0:
-            return True
-    return False
+from ..compiled import kernel
+from ..element.assembly import add_matrix, add_vector, clear, expand, expand_matrix
+from ..element.geometric_stiffness import geometric_stiffness
+from ..element.strains import ROWS, STRAINS, frame, gradients, strains
+from ..loads import NO_ENERGY, add_static_loads, potentials, press_sag, summed
+from ..simd.columns import attitude, chord
 
 
 @kernel

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array
+from ..arrays import Array
+from ..element.strains import INSIDE_OUT, inverted
+from ..line import Line, Water
 from .energy import energies
-from .line import Line, Water
 from .newton import solve_step
 from .state import WORKS, PipeState
-from .static_kernel import INSIDE_OUT, inverted
-from .step_kernel import element_strains, folded
+from .system import element_strains, folded
 
 STIFF = np.zeros((6, 6))  # mobility of a top that moves as it is told
 # Searches for a step's solution: the guess of the mean velocities, from those of the last three steps, and whether to go carefully
@@ -40,7 +40,7 @@ def rest(line: Line, position: Array, quaternion: Array, time: float) -> PipeSta
 
 
 def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Array, h: float, mobility: Array = STIFF) -> StepResult:
-    """One discretely passive step of length h [s] (step_kernel.py).
+    """One discretely passive step of length h [s] (step/system.py).
 
     water: at the middle of the step; velocity, spin (3,): mean velocity and angular velocity of the top, in e; or those that it
     would have without the pipe, where it yields to the pipe's pull with `mobility` (6, 6), the derivative of the one by the other.

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array
-from .static_balance import Balance, Factors, limited
+from ..arrays import Array
+from .balance import Balance, Factors, limited
 
 TOLERANCE = 1e-11  # of the line's weight or largest end force (times its longest element, for moments)
 ROUND_OFF = 1e-7  # accepted once the residual no longer falls,

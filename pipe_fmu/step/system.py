@@ -20,18 +20,17 @@ import math
 
 import numpy as np
 
-from .assembly import clear
-from .columns import columns, fill, fill_straight, room, take
-from .compiled import inner, kernel
-from .element import ROWS, frame, strains
-from .element_kernel import add_elements
-from .lane_arrays import group, row
-from .lanes import WIDTH, largest, total
-from .line import line_columns
-from .node_kernel import PATH, add_nodes
-from .so3 import exp, multiply, scale
+from ..compiled import inner, kernel
+from ..element.assembly import clear
+from ..element.strains import ROWS, frame, strains
+from ..line import line_columns
+from ..maths.so3 import exp, multiply, scale
+from ..simd.columns import attitude, chord, columns, fill, fill_straight, room, take, vector_of
+from ..simd.lane_arrays import group, row
+from ..simd.lanes import WIDTH, largest, total
+from .elements import add_elements
+from .nodes import PATH, add_nodes
 from .state import WORKS
-from .static_kernel import attitude, chord, vector_of
 
 _COUNT = len(WORKS)
 
@@ -101,7 +100,7 @@ def step_system(line, water, h, position, quaternion, velocity, rate, flow, stra
 
 @inner
 def assemble(line, water, h, old, new, x, fresh, sharp, system, works):
-    """`step_system` on columns (columns.py)."""
+    """`step_system` on columns (simd/columns.py)."""
     moves, turned, _ = new
     diagonal, lower, upper, residual = system
     if fresh:

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array
-from .compiled import inner
-from .parameters import PipeParameters
+from ..arrays import Array
+from ..compiled import inner
+from ..parameters import PipeParameters
 from .section_forces import SAMPLES, SectionForces, bending_square
 
 _AT_JOINT = 1e-9  # m; so near to the end of a section a node stands at its joint

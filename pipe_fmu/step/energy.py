@@ -1,13 +1,13 @@
 """Energies of the pipe, eqs. (71)-(73) with gravity's sign mended."""
 
-from .compiled import inner
-from .element import STRAINS
-from .loads import NO_ENERGY, potentials, summed
+from ..compiled import inner
+from ..element.strains import STRAINS
+from ..loads import NO_ENERGY, potentials, summed
 
 
 @inner
 def energies(line, position, quaternion, velocity, rate, flow, strain):
-    """Energies [J] of a state, in the order of state.ENERGIES; arrays as in step_kernel.step_system."""
+    """Energies [J] of a state, in the order of state.ENERGIES; arrays as in step.system.step_system."""
     kinetic, elastic, stored = 0.0, 0.0, NO_ENERGY
     n = position.shape[0]
     for e in range(n - 1):

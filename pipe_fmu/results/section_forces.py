@@ -13,7 +13,7 @@ make moments fourth-order accurate in motion as at rest, and forces, in motion, 
   bent alike) and 15 (1 / F - 1) / z (bent to an S) of what the cubic says (exact bar under tension and linear load). Both are 1 for a short
   element, and with EI the moment goes to zero. An element that is pushed keeps the cubic.
 
-Tension is the effective tension; the wall's own: wall_stress.py. Viscous stresses of internal damping are those of the rates of strain at
+Tension is the effective tension; the wall's own: results/wall_stress.py. Viscous stresses of internal damping are those of the rates of strain at
 the instant; numerical damping acts on the means over a step only, and is left out. So are the couples of rotary inertia (27) and rotational
 damping (32), which cancel in the mean of left and right at all nodes but the ends.
 """
@@ -23,12 +23,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .columns import columns, fill_straight, room
-from .arrays import Array
-from .compiled import inner, kernel
+from ..simd.columns import columns, fill_straight, room
+from ..arrays import Array
+from ..compiled import inner, kernel
 from .end_forces import end_forces, matrix_at, node_motion
-from .line import line_columns
-from .so3 import add, apply, apply_transposed, dot, scale, subtract
+from ..line import line_columns
+from ..maths.so3 import add, apply, apply_transposed, dot, scale, subtract
 
 SAMPLES = 8  # parts of an element between whose ends a largest value is sought
 _SHORT = 1e-2  # z below which the factors are taken from their series
@@ -81,7 +81,7 @@ def bending_square(s, moment, shear, e, x):
 
 @kernel
 def nodal_wrenches(line, mass, water, position, quaternion, velocity, rate, strain):
-    """Section force and moment (n, 6) at the nodes, material components; arrays as in step_kernel.step_system, `mass` a MassPerLength."""
+    """Section force and moment (n, 6) at the nodes, material components; arrays as in step.system.step_system, `mass` a MassPerLength."""
     n = position.shape[0]
     ends, frames, plain = np.zeros((n - 1, 12)), np.empty((n - 1, 9)), np.empty((n - 1, 6))
     positions, velocities, spins = np.empty((3, room(n))), np.empty((n, 3)), np.empty((n, 3))

@@ -16,7 +16,7 @@ Strains (the order of the rows of `stiffness` and of the gradients):
 Where the chord stands at an angle a to t_1 of the mid frame, s is |u| / h times the sine of a and f = 2 |u| / (|u| + u_1), which is
 1 / cos^2(a / 2), so that g is |u| / h times 2 tan(a / 2). They differ by a^3 / 4 to lowest order, but the sine falls beyond a right angle
 and vanishes at a = pi, where the element is quite inside out; g grows with a, without bound at pi. Eq. (1), <d_S phi, R e1> > 0, is
-broken from a right angle on, which `static_kernel.inverted` refuses.
+broken from a right angle on, which `inverted` refuses.
 The extension by bending takes f s^2 (that is 4 sin^2(a / 2)): it grows with a too, so that tension as well turns an element right side
 out, and is bounded, so that no element can pay for its turning by shortening to a point. Twist and bending, corrected by little, take s.
 
@@ -32,19 +32,21 @@ strain (1e-10 in a pipe). The reward is fourth order with two nodes under any fo
 never shears the section away, however long the element. Only where EI_2 and EI_3 differ, and the line is bent about both axes at once, does
 the twist vary within an element, and the order is two. (Residual bending flexibility: MacNeal 1978; SE(3) element: Sonneville et al. 2014.)
 
-Variations, in the mid frame, from nu = R_m^T delta d and the mean spin beta and spin difference mu of the ends (relative_rotation.py):
+Variations, in the mid frame, from nu = R_m^T delta d and the mean spin beta and spin difference mu of the ends (relative_rotation):
 delta u = nu + u x beta_m. A function f(u, psi) with gradients n, q so has the conjugate vectors n, c = n x u, m = A^-1 q + b psi x c of
 (nu, beta, mu): its row of nine, turned to e. The sag also turns with the frame, d(R_m^T e3) = R_m^T e3 x beta_m, which adds to c.
 """
 
 import math
 
-from .compiled import inner
-from .relative_rotation import chi_of, half_spin
-from .so3 import add, apply, apply_transposed, conjugate, cross, dot, log, matrix, multiply, root, scale
+from ..compiled import inner, kernel
+from ..maths.relative_rotation import chi_of, half_spin
+from ..maths.so3 import add, apply, apply_transposed, conjugate, cross, dot, log, matrix, multiply, root, scale
+from ..simd.columns import attitude, chord
 
 STRAINS = 6
 ROWS = 7
+INSIDE_OUT = "turned inside out"  # see `inverted`
 COIL = 1.0 / 24.0  # of the chord of a line bent and twisted at once
 
 
@@ -54,6 +56,16 @@ def frame(q1, q2, d):
     relative = multiply(conjugate(q1), q2)
     rm = matrix(multiply(q1, root(relative)))
     return rm, apply_transposed(rm, d), log(relative)
+
+
+@kernel
+def inverted(position, quaternion):
+    """Whether an element is turned inside out: its chord points against its sections, <d_S phi, R e1> <= 0 in eq. (1)."""
+    for e in range(position.shape[0] - 1):
+        _, u, _ = frame(attitude(quaternion.T, e), attitude(quaternion.T, e + 1), chord(position.T, e, e + 1))
+        if not u[0] > 0.0:
+            return True
+    return False
 
 
 @inner

@@ -6,7 +6,7 @@ adds nothing. p leaves room for the last lanes of nodes and, one further on, of 
 
 import numpy as np
 
-from .compiled import inner, kernel
+from ..compiled import inner, kernel
 from .lanes import WIDTH
 
 
@@ -65,3 +65,21 @@ def columns(a, n, beyond):
 def column(a, n, beyond):
     """Column (p,) of a (m,); none of an array without entries."""
     return columns(a.reshape(a.shape[0], 1), n, beyond)[0]
+
+
+@inner
+def vector_of(columns, k, at):
+    """Components k, k + 1, k + 2 of columns at a node or a group of nodes."""
+    return (columns[k, at], columns[k + 1, at], columns[k + 2, at])
+
+
+@inner
+def attitude(quaternion, at):
+    """Quaternion, from columns, of a node or a group of nodes."""
+    return (quaternion[0, at], quaternion[1, at], quaternion[2, at], quaternion[3, at])
+
+
+@inner
+def chord(position, a, b):
+    """phi_b - phi_a from columns of positions, or of displacements."""
+    return (position[0, b] - position[0, a], position[1, b] - position[1, a], position[2, b] - position[2, a])

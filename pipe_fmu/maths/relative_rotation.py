@@ -11,8 +11,8 @@ closed form. Either way they and their first derivatives are good to 1e-11, the 
 
 import math
 
-from .compiled import inner
-from .lanes import below, lane_by_lane
+from ..compiled import inner
+from ..simd.lanes import below, lane_by_lane
 from .so3 import add, cross, dot, scale
 
 _BENT, _TURNED = 0.36, 0.04  # bounds of |psi|^2 below which series are used

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays import Array
+from ..line import Line, Water
+from ..maths.so3 import conjugate, exp, log, multiply, scale
 from . import catenary
-from .arrays import Array
-from .line import Line, Water
+from .balance import Balance, Factors, Pose, Scales
 from .relaxation import DESCENTS, relax
-from .so3 import conjugate, exp, log, multiply, scale
-from .static_balance import Balance, Factors, Pose, Scales
 
 _HAULED_FROM = 0.9  # of the taut distance
 _LONGEST = 1.0 / 8.0  # of the way that the top is led, in one step,

@@ -1,19 +1,19 @@
-"""Newton's method for the equations of one step, which step_kernel.py makes, with the ends held as ends.py says."""
+"""Newton's method for the equations of one step, which step/system.py makes, with the ends held as element/ends.py says."""
 
 import math
 
 import numpy as np
 
-from .block_tridiagonal import SIZE, condense, factorize, substitute
-from .columns import take
-from .compiled import inner, kernel
-from .element import STRAINS
-from .ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
-from .lanes import larger
-from .line import line_columns
-from .node_kernel import advance
+from ..compiled import inner, kernel
+from ..element.ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
+from ..element.strains import STRAINS
+from ..line import line_columns
+from ..maths.block_tridiagonal import SIZE, condense, factorize, substitute
+from ..simd.columns import take
+from ..simd.lanes import larger
+from .nodes import advance
 from .state import WORKS, PipeState
-from .step_kernel import assemble, old_columns
+from .system import assemble, old_columns
 
 TOLERANCE = 1e-11  # of the largest element force (moment), inertia included as below: well below any coupling tolerance
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
@@ -157,7 +157,7 @@ def _advanced(line, h, state, old, new, x, force, works):
 
 @kernel
 def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scratch):
-    """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (columns.py).
+    """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (simd/columns.py).
 
     The top's increment is `top` (6,) less mobility (6, 6) x the force on it; without a mobility it is prescribed, and met exactly; with
     one the force is still exactly that of the increment found, but the relation between the two is met to the last correction only.
@@ -167,7 +167,7 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
     overshoots, and halves a correction that does not lower the residual. Fills the force on the pipe's top (6,), the tangent (6, 6) as the
     top feels it and the works (len(WORKS),). Returns (converged, corrections, residual).
 
-    ends: quaternions (n, 4), mobility, top, force, tangent; system: as in step_kernel.assemble; scratch: (n, 6), (6,), (6,), (n, 6).
+    ends: quaternions (n, 4), mobility, top, force, tangent; system: as in step.system.assemble; scratch: (n, 6), (6,), (6,), (n, 6).
     """
     quaternion, mobility, top, force, tangent = ends
     correction, wanted, move, best = scratch

@@ -4,7 +4,7 @@
 
 `below` asks whether all lanes are below a bound (for a series), `lane_by_lane` takes a function to the lanes that no series will do for;
 both take plain numbers too. `above` is 1 in the lanes above a bound and 0 elsewhere, `total` and `largest` reduce lanes to a number. How
-lanes are read from arrays and written: lane_arrays.py.
+lanes are read from arrays and written: simd/lane_arrays.py.
 """
 
 import math

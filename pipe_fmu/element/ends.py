@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 
-from .block_tridiagonal import SIZE, lu, lu_solve, lu_solve_vector
-from .compiled import inner, kernel
-from .so3 import dot, matrix
+from ..compiled import inner, kernel
+from ..maths.block_tridiagonal import SIZE, lu, lu_solve, lu_solve_vector
+from ..maths.so3 import dot, matrix
 
 
 @inner

@@ -4,7 +4,7 @@ An element's rows of nine (chord, mean spin, spin difference) reach its nodes th
 theta_2 - theta_1. A node's six unknowns are (displacement, spin), all in e.
 """
 
-from .compiled import inner
+from ..compiled import inner
 
 
 @inner

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from .compiled import inner, kernel
-from .lane_arrays import lane, rows_of_six, six
+from ..compiled import inner, kernel
+from ..simd.lane_arrays import lane, rows_of_six, six
 
 SIZE = 6
 _SHRUNK = 1e-4  # of the largest entry of its column: a pivot for which rows are exchanged

@@ -1,20 +1,18 @@
-"""What a step does in the elements: internal forces, eqs. (20)-(23) in element.py's strains, weight (28), drag (29)-(31), the bed, and the
-tangent of them all. See step_kernel.py.
-"""
+"""What a step does in the elements: internal forces, eqs. (20)-(23), by the strains of element/strains.py, and loads; see system.py."""
 
 import math
 
-from .assembly import add_matrix, add_vector, expand, expand_matrix
-from .compiled import inner
-from .element import ROWS, STRAINS, frame, gradients, resultant, strains
-from .geometric_stiffness import geometric_stiffness
-from .lane_arrays import grid, group, lane, row
-from .lanes import above, below
-from .loads import add_mean_loads, even_on_sag, lies, press_mean_sag
-from .node_kernel import END, MIDDLE, PATH, turn_columns
-from .so3 import add, dot, left_jacobian, scale
+from ..compiled import inner
+from ..element.assembly import add_matrix, add_vector, expand, expand_matrix
+from ..element.geometric_stiffness import geometric_stiffness
+from ..element.strains import ROWS, STRAINS, frame, gradients, resultant, strains
+from ..loads import add_mean_loads, even_on_sag, lies, press_mean_sag
+from ..maths.so3 import add, dot, left_jacobian, scale
+from ..simd.columns import attitude, chord, vector_of
+from ..simd.lane_arrays import grid, group, lane, row
+from ..simd.lanes import above, below
+from .nodes import END, MIDDLE, PATH, turn_columns
 from .state import INTERNAL, NUMERICAL
-from .static_kernel import attitude, chord, vector_of
 
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)  # of the Gauss points of the path
 _CLOSURE_ANGLE = 0.02  # rad per step; below it three Gauss points are exact to round-off
@@ -23,8 +21,9 @@ _NO_MOTION = 1e-300  # square of a motion
 
 @inner
 def add_elements(line, water, first, count, h, old, new, fresh, sharp, system, sums, peaks):
-    """Add what the `count` elements from `first` on do; arrays as in step_kernel.assemble, works into `sums` (len(WORKS),), the largest force and
-    moment at an end of an element into `peaks` (2,).
+    """Add internal forces and loads of the `count` elements from `first` on to `system`; arrays as in step.system.assemble.
+
+    Adds works to `sums` (len(WORKS),), and raises `peaks` (2,) to the largest force and moment at an end of an element.
     """
     position, strain = old[0], old[5]
     moves, turned, new_strain = new

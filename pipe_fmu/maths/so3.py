@@ -1,6 +1,6 @@
 """Rotations as unit quaternions (scalar first) and vectors as tuples of three floats.
 
-All functions are compiled, take and return tuples, and allocate nothing; their numbers may be Lanes (lanes.py). `exp` and `log` are the
+All functions are compiled, take and return tuples, and allocate nothing; their numbers may be Lanes. `exp` and `log` are the
 exponential map of SO(3) and its inverse (rotation vectors); `left_jacobian` is the matrix J_l of `exp(J_l(theta) d) exp(theta) =
 exp(theta + d)` to first order in d. Source: Crisfield and Jelenic (1999), section 2; Sola (2017), chapter 4.
 
@@ -10,8 +10,8 @@ closed form.
 
 import math
 
-from .compiled import inner
-from .lanes import below, lane_by_lane
+from ..compiled import inner
+from ..simd.lanes import below, lane_by_lane
 
 _TURN = 0.25  # bound of z for sines
 _ARC = 0.023  # and for the tangent's inverse, of its square

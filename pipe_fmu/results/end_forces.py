@@ -1,15 +1,15 @@
 """What the elements hand to their nodes at an instant: section forces, eqs. (20)-(23), with the viscous part of internal damping, less
-weight (28), drag (29)-(31) and the bed's elastic reaction. See section_forces.py.
+weight (28), drag (29)-(31) and the bed's elastic reaction. See results/section_forces.py.
 """
 
-from .assembly import expand
-from .compiled import inner
-from .element import ROWS, STRAINS, frame, gradients
-from .lane_arrays import grid, group, lane, row
-from .lanes import WIDTH
-from .loads import add_instant_loads, even_on_sag
-from .so3 import apply, cross, matrix, scale
-from .static_kernel import attitude, chord
+from ..element.assembly import expand
+from ..compiled import inner
+from ..element.strains import ROWS, STRAINS, frame, gradients
+from ..simd.lane_arrays import grid, group, lane, row
+from ..simd.lanes import WIDTH
+from ..loads import add_instant_loads, even_on_sag
+from ..maths.so3 import apply, cross, matrix, scale
+from ..simd.columns import attitude, chord
 
 
 @inner
@@ -20,7 +20,7 @@ def matrix_at(quaternion, k):
 
 @inner
 def node_motion(line, quaternion, velocity, rate, velocities, spins):
-    """Velocities and angular velocities (n, 3), e, of the nodes, from those of the centres of their masses (node_kernel.py)."""
+    """Velocities and angular velocities (n, 3), e, of the nodes, from those of the centres of their masses (step/nodes.py)."""
     for k in range(quaternion.shape[0]):
         r = matrix_at(quaternion, k)
         spin = apply(r, (rate[k, 0], rate[k, 1], rate[k, 2]))

@@ -1,4 +1,4 @@
-"""Geometric stiffness of the element (element.py): the derivative of its forces at fixed section forces, exact.
+"""Geometric stiffness of the element (element/strains.py): the derivative of its forces at fixed section forces, exact.
 
 Along every one of the nine (chord, mean spin, spin difference) in turn the changes of u, psi and R_m^T e3 are found first, from them those
 of the conjugate vectors n, q, c and m, and last their turning with the mid frame. Unsymmetric where the element is not in equilibrium.
@@ -6,10 +6,10 @@ of the conjugate vectors n, q, c and m, and last their turning with the mid fram
 
 import math
 
-from .compiled import inner
-from .element import COIL, barrier, chord_shear, conjugate_vectors, shear_force
-from .relative_rotation import chi_of, half_spin
-from .so3 import add, apply, cross, dot, scale
+from ..compiled import inner
+from ..maths.relative_rotation import chi_of, half_spin
+from ..maths.so3 import add, apply, cross, dot, scale
+from .strains import COIL, barrier, chord_shear, conjugate_vectors, shear_force
 
 
 @inner

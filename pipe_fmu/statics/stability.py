@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 
-from .block_tridiagonal import SIZE
-from .arrays import Array
-from .compiled import kernel
-from .line import Line
-from .so3 import matrix
+from ..arrays import Array
+from ..compiled import kernel
+from ..line import Line
+from ..maths.block_tridiagonal import SIZE
+from ..maths.so3 import matrix
 
 
 def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], added: Array) -> bool:

@@ -5,14 +5,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .block_tridiagonal import condense, factorize, substitute
-from .arrays import Array
-from .compiled import kernel
-from .ends import condense_top, hold_foot, hold_foot_tangent, top_correction
-from .line import Line, Water
-from .so3 import exp, multiply, normalize
+from ..arrays import Array
+from ..compiled import kernel
+from ..element.ends import condense_top, hold_foot, hold_foot_tangent, top_correction
+from ..element.strains import INSIDE_OUT, inverted
+from ..line import Line, Water
+from ..maths.block_tridiagonal import condense, factorize, substitute
+from ..maths.so3 import exp, multiply, normalize
+from ..simd.columns import attitude
 from .stability import positive
-from .static_kernel import INSIDE_OUT, attitude, inverted, static_system
+from .system import static_system
 
 Pose = tuple[Array, Array]  # positions (n, 3) [m], attitudes (n, 4)
 

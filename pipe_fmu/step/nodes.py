@@ -1,13 +1,11 @@
 """What a step does at the nodes: inertia of lumped mass and section, eqs. (25)-(27), rotational damping (32) in the material frame, added
-mass by Kirchhoff's equations; and the state after it. See step_kernel.py.
+mass by Kirchhoff's equations; and the state after it. See step/system.py.
 """
 
 import math
 
-from .compiled import inner
-from .lane_arrays import grid, group, lane, row
-from .lanes import WIDTH
-from .so3 import (
+from ..compiled import inner
+from ..maths.so3 import (
     add,
     apply,
     apply_transposed,
@@ -19,8 +17,10 @@ from .so3 import (
     normalize,
     scale,
 )
+from ..simd.columns import attitude, vector_of
+from ..simd.lane_arrays import grid, group, lane, row
+from ..simd.lanes import WIDTH
 from .state import ROTATIONAL
-from .static_kernel import attitude, vector_of
 
 PATH = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15), 1.0)  # of a step: three Gauss points and the end,
 MIDDLE, END = 1, 3  # of which two are named
@@ -67,7 +67,7 @@ def _add_lever(arm, arm_new, tensor, gain, fresh, block, residual):
 
 @inner
 def add_nodes(line, first, count, h, old, moves, turned, fresh, diagonal, residual, sums):
-    """Add the inertia, damping and added mass of the `count` nodes from `first` on; arrays as in step_kernel.assemble."""
+    """Add the inertia, damping and added mass of the `count` nodes from `first` on; arrays as in step.system.assemble."""
     at = group(first)
     block, force = grid(6, 6), row(6)
     for i in range(6):
@@ -148,7 +148,7 @@ def _add_added_mass(m, h, flow, r_mid, spin_t, arm, arm_new, move, fresh, block,
 
 @inner
 def advance(line, h, old, moves, turned, new):
-    """Columns `new` of attitudes, velocities, body rates and added-mass velocities after the increments; see step_kernel.assemble."""
+    """Columns `new` of attitudes, velocities, body rates and added-mass velocities after the increments; see step.system.assemble."""
     _, quaternion, velocity, rate, flow, _ = old
     new_quaternion, new_velocity, new_rate, new_flow = new
     for first in range(0, line.mass.shape[0], WIDTH):

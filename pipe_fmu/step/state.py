@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from . import loads
-from .arrays import Array
+from .. import loads
+from ..arrays import Array
 
 LEDGER = {  # ports of energies and works: what they are, and the least they can be
     "kinetic_energy": ("kinetic energy", 0.0),

@@ -1,0 +1,1 @@
+"""Equilibrium of the pipe at rest, and its stability. Eq. (94)."""
