@@ -96,7 +96,9 @@ class _Account:
 
 
 class Ledger:
-    """Opens with the FMUs initialised and at rest between two steps; call `check` after every step.
+    """Books of the energy (70), (77), and proof of (89), (90), step by step.
+
+    Opens with the FMUs initialised and at rest between two steps; call `check` after every step.
 
     `tolerance` is what is allowed of the closure error, and of the interface residuals' amounts together, relative to the energy
     exchanged so far: the sum of |dB| of the first FMU (of a single FMU without a bond: of the largest change of any column); to it

@@ -149,7 +149,7 @@ class PipeUnit:
         state, top, impedance, iterations, residual = self.state
         memo = self._memo
         if name in ("force", "moment"):
-            memo["force"], memo["moment"] = -top[:3], -top[3:]
+            memo["force"], memo["moment"] = -top[:3], -top[3:]  # eq. (69)
         elif name in ("force_change", "moment_change"):
             memo["force_change"], memo["moment_change"] = -top[:3] - self._reference[:3], -top[3:] - self._reference[3:]
         elif name in ("top_velocity", "top_angular_velocity"):

@@ -50,11 +50,12 @@ def energy(one, two, h, stiffness):
 
 
 def forces(one, two, h, stiffness, step=1e-6):
-    """Derivatives (12,) of the energy with respect to displacements [m] and spins [rad], in e, of both nodes, by fourth-order differences."""
+    """Derivatives (12,) of the energy by displacements [m] and spins [rad], in e, of both nodes: fourth-order differences."""
 
     def at(x):
-        moved = [(phi + d[:3], Rotation.from_rotvec(d[3:]).as_matrix() @ r) for (phi, r), d in zip((one, two), x.reshape(2, 6), strict=True)]
-        return energy(*moved, h, stiffness)
+        (phi_1, r_1), (phi_2, r_2) = one, two
+        turn_1, turn_2 = Rotation.from_rotvec([x[3:6], x[9:]]).as_matrix()
+        return energy((phi_1 + x[:3], turn_1 @ r_1), (phi_2 + x[6:9], turn_2 @ r_2), h, stiffness)
 
     def slope(way):
         near, far = (at(k * step * way) - at(-k * step * way) for k in (1, 2))

@@ -128,7 +128,7 @@ def test_instances_of_two_exports_keep_apart_in_one_process(exported, small):
 
 def test_pipes_of_two_packages_are_two_types_to_the_compiler(exported):
     """Else a kernel compiled where an FMU was first would be kept with the FMU's type in it, and fail in processes without the FMU."""
-    bundled = importlib.import_module(f"{bundled_package(exported / 'pipe.fmu').__name__}.state")
+    bundled = importlib.import_module(f"{bundled_package(exported / 'pipe.fmu').__name__}.step.state")
     tuples = []  # alive together: numba lets equal names be one type
     for cls in (bundled.PipeState, PipeState):
         state = types.NamedTuple([types.float64] * len(cls._fields), cls)

@@ -21,7 +21,8 @@ FLOORS = {  # of pipe_fmu, from the ground up: a module imports from lower floor
     "slave": 10,
 }  # fmt: skip
 WITH_UNITS = {  # modules of master that import the two units; no process that runs FMUs imports them
-    "master.statics", "master.monolithic", "master.hard_cases", "master.sections", "master.prepare", "master.benchmarks",
+    "master.statics", "master.monolithic", "master.hard_cases", "master.sections", "master.prepare", "master.keys",
+    "master.benchmarks", "master.stability.study",
 }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 import math
 
+import element_twin
 import numpy as np
 import pytest
 from pipe_helpers import rotation, rotation_vector_quaternion, times
@@ -102,6 +103,23 @@ def test_resultant_is_the_stress_times_the_gradients(bend, share, chord):
     got = np.empty(9)
     element.resultant(*element.frame(*(tuple(x) for x in at)), LENGTH, share, stress, got)
     np.testing.assert_allclose(got, stress @ gradients(*at, share), atol=1e-13 * np.abs(got).max())
+
+
+@pytest.mark.parametrize("chord", CHORDS)
+@pytest.mark.parametrize("bend", BENDS)
+def test_the_kernels_are_the_twin_in_numpy(bend, chord):
+    """Strains, sag, energy, and the forces of both nodes as differences of the twin's energy."""
+    q1, q2, d = pose(bend, chord)
+    stiffness = np.array([3e9, 4e8, 4e8, 6e7, 8e7, 5e7])
+    k, share = element_twin.chord_shear(LENGTH, stiffness)
+    one, two = (np.zeros(3), rotation(q1)), (np.array(d), rotation(q2))
+    strain, sag = element_twin.strains(one, two, LENGTH, stiffness)
+    np.testing.assert_allclose(strains(q1, q2, d, share), [*strain, sag], rtol=1e-11, atol=1e-13)
+    modulus = LENGTH * np.array([stiffness[0], *k, *stiffness[3:]])
+    nine, twelve = (modulus * strain) @ gradients(q1, q2, d, share)[:6], np.empty(12)
+    assembly.expand(nine, twelve)
+    expected = element_twin.forces(one, two, LENGTH, stiffness)
+    np.testing.assert_allclose(twelve, expected, rtol=1e-6, atol=1e-7 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("angle", [1.0, 30.0, 80.0, 100.0, 150.0, 179.0])

@@ -362,7 +362,7 @@ def test_residual_is_the_same_with_and_without_its_tangent(name, size):
     for fresh in (True, False):
         system = np.empty((10, 6, 6)), np.empty((9, 6, 6)), np.empty((9, 6, 6)), np.empty((10, 6))
         strain, works = np.empty((9, 7)), np.empty(6)
-        old = state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain
+        old = state.position, state.quaternion, state.velocity, state.rate, state.added_mass_velocity, state.strain
         scales = step_kernel.step_system(pipe.line, water, 0.1, *old, x, strain, fresh, True, system, works)
         both.append((system[3], strain, works, scales))
     for one, other in zip(*both, strict=True):

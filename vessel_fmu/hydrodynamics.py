@@ -76,7 +76,7 @@ def add_restoring(
     """Add the mean of dU over a step, left-hand side of (48), to `force` (6,), N and N m in b.
 
     `heave`, m, and `down` = R_old^T e3 (3,) are those at the start of the step, `axis` (3,) the mean of R^T e3, nu (6,)
-    the mean velocity, h the step, s. With axis = down and h = 0 this is the static force (54), (59).
+    the mean velocity, h the step, s. With axis = down and h = 0 this is the static force (54), (58), (59), (60); (55), (57) without angles.
     """
     v, w = nu[:3], nu[3:]
     sinking = dot(axis, v) + flotation * (axis[1] * w[2] - axis[2] * w[1])  # of r_F
@@ -92,7 +92,7 @@ def add_restoring(
 
 @kernel
 def add_drag(surge_drag: float, strips: Array, nu: Array, force: Array) -> None:
-    """Add the quadratic drag d(nu_r) of the relative velocity nu_r (6,) to `force` (6,), N and N m in b."""
+    """Add the quadratic drag d(nu_r), eq. (53), of the relative velocity nu_r (6,) to `force` (6,), N and N m in b."""
     force[0] += surge_drag * abs(nu[0]) * nu[0]
     for k in range(strips.shape[0]):
         speed = nu[1] + strips[k, 0] * nu[5]

@@ -68,7 +68,7 @@ def eliminate(a: Array) -> None:
 
 @kernel
 def unbalance(hull: Hull, heave: float, nu_old: Array, held: Array, thrust: Array, h: float, nu: Array, residual: Array) -> float:
-    """Fill `residual` (6,), left minus right side at the mean velocity nu, and return its size relative to its terms.
+    """Fill `residual` (6,), left minus right side of eq. (48) at the mean velocity nu, and return its size relative to its terms.
 
     held (5, 3), in the body axes at the start: force at the hang-off point, all spatial force, all moment, current
     velocity, e3; thrust (6,): what acts in b.
@@ -180,8 +180,9 @@ def mobility(hull: Hull, rotation: Array, mean: Array, nu: Array, h: float, syst
 
 @kernel
 def works(hull: Hull, loads: Array, nu: Array, v: Array, top: Array, w: Array, relative: Array, h: float) -> Array:
-    """Works (6,), J, of a step h: bond, control, environment, current; dissipations of damping and drag. Velocities are means.
+    """Works (6,), J, of a step h: bond, control, environment, current; dissipations of damping and drag, eqs. (85)-(87).
 
+    Velocities are means.
     nu (6,) and `relative` = nu - nu_c in b; v, w of the centre of gravity and `top` of the hang-off point, (3,) in e.
     """
     drag, out = np.zeros(6), np.empty(6)

@@ -180,5 +180,5 @@ def symmetric_matrix(entries: AddedMass | LinearDamping) -> np.ndarray:
 
 
 def mass_matrix(parameters: VesselParameters) -> np.ndarray:
-    """M = M_RB + M_A, eq. (37), 6 x 6 about the centre of gravity, in b."""
+    """M = M_RB + M_A, eqs. (37), (38), 6 x 6 about the centre of gravity, in b."""
     return np.diag([parameters.mass] * 3 + list(parameters.inertia)) + symmetric_matrix(parameters.added_mass)

@@ -18,7 +18,7 @@ def kinetic_energy(mass: Array, nu: Array) -> float:
 
 @kernel
 def add_coriolis(mass: Array, nu: Array, force: Array) -> None:
-    """Add C(nu) nu to `force` (6,), N and N m."""
+    """Add C(nu) nu, eqs. (49)-(52), to `force` (6,), N and N m."""
     momentum = apply(mass, nu)
     add_cross(force[:3], 1.0, nu[3:], momentum[:3])
     add_cross(force[3:], 1.0, nu[3:], momentum[3:])

@@ -148,12 +148,12 @@ class Vessel:
         return -x * float(state.position[0] - start[0]) - y * float(state.position[1] - start[1])
 
     def hang_off_pose(self, position: Array, quaternion: Array) -> tuple[Array, Array]:
-        """Hang-off point (3,), m in e, and orientation (4,) t to e of the pipe section held there, for a pose of the hull."""
+        """Hang-off point (3,), m in e, and orientation (4,) t to e of the pipe section held there, eq. (5)."""
         point = position + rotation_matrix(quaternion) @ self.hull.hang_off
         return point, multiply(quaternion, self.held_section)
 
     def hang_off_velocity(self, quaternion: Array, nu: Array) -> Array:
-        """Velocity, m/s, and angular velocity, rad/s, of the hang-off point, (6,) in e, for a body velocity nu (6,)."""
+        """Velocity, m/s, and angular velocity, rad/s, of the hang-off point, (6,) in e, for a body velocity nu (6,); eq. (68)."""
         rotation = rotation_matrix(quaternion)
         return np.concatenate([rotation @ (nu[:3] + np.cross(nu[3:], self.hull.hang_off)), rotation @ nu[3:]])
 

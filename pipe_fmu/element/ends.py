@@ -19,7 +19,7 @@ def axis_of_foot(quaternion):
 
 @inner
 def hold_foot(line, quaternion, vector):
-    """Take from `vector` (6,) of the foot what it may not do, or from its residual what holds it.
+    """Take from `vector` (6,) of the foot what it may not do, eq. (33), or from its residual what holds it, without power, eq. (88).
 
     A guess and a correction move it by round-off, which the reaction of a very short step makes work of.
     """

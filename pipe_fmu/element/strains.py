@@ -96,10 +96,10 @@ def strains(rm, u, psi, h, share, out):
     f, _ = barrier(u)
     b2, b3 = share[0] * s2, share[1] * s3
     out[0] = (length - h) / h + 0.1 * f * (b2 * b2 + b3 * b3)
-    out[1] = f * s2
+    out[1] = f * s2  # eq. (17)
     out[2] = f * s3
     out[3] = (psi[0] + b2 * psi[1] + b3 * psi[2]) / h
-    out[4] = (psi[1] - b2 * psi[0]) / h
+    out[4] = (psi[1] - b2 * psi[0]) / h  # eq. (11)
     out[5] = (psi[2] - b3 * psi[0]) / h
     out[6] = 0.5 * dot(rm[2], cross(u, psi))
 
@@ -194,7 +194,7 @@ def conjugate_vectors(down, u, psi, h, share, stress, chi, chi1):
 
 @inner
 def resultant(rm, u, psi, h, share, stress, out):
-    """`stress` (7,) . gradients into `out` (9,), e components: force on the chord, moments on the mean spin and the spin difference."""
+    """`stress` (7,) . gradients into `out` (9,), e: force on the chord, moments on mean spin and spin difference; eqs. (22), (23)."""
     z = dot(psi, psi)
     chi, chi1, _ = chi_of(z)
     n, q, c = conjugate_vectors(rm[2], u, psi, h, share, stress, chi, chi1)

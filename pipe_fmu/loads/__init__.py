@@ -101,19 +101,21 @@ def press_mean_sag(loads, first, count, length, h, old, new, stress):
 
 
 @inner
-def add_mean_loads(line, water, first, count, h, old, new, middle, ends, mean, final, fresh, sharp, vector, matrix, scratch, sums):
-    """Add minus the mean loads on `count` elements from `first` on, over a step of h [s], to `vector` (12,) and, if `fresh`, their tangent
-    to `matrix` (12, 12); works into `sums`.
+def add_mean_loads(line, water, first, count, step, middle, ends, gradients, want, into):
+    """Add minus the mean loads over a step on `count` elements from `first` on, their tangent and their works.
 
-    old, new: as in step.system.assemble; middle: frame half way; ends (2, 6): mean velocities of the nodes; mean, final (7, 9): gradients
-    of strains and sag, averaged over the step and at its end; sharp: see `bed.add_mean_contact`; scratch: two (3, 12).
+    step: its length h [s], and old and new columns as in step.system.assemble; middle: frame, chord and relative rotation half way; ends
+    (2, 6): mean velocities of the nodes; gradients: of strains and sag, averaged over the step and at its end, two (7, 9); want: whether
+    the tangent, and whether Newton's of friction (`bed.add_mean_contact`); into: forces (12,), tangent (12, 12), scratch of two (3, 12),
+    works.
     """
+    (h, old, new), (mean, final), (vector, matrix, scratch, sums) = step, gradients, into
     a, b = group(first), group(first + 1)
     loads, moves, z = line.loads, new[0], old[0][2]
     weight.add_weight(line.length[a] * loads.weight[a], vector)
     if water.drag:
         depths = z[a] + 0.5 * moves[2, a], z[b] + 0.5 * moves[2, b]
-        how = (loads.drag[0, a], loads.drag[1, a]), ends, depths, water.levels, water.velocities, 1.0 / h, fresh
+        how = (loads.drag[0, a], loads.drag[1, a]), ends, depths, water.levels, water.velocities, 1.0 / h, want[0]
         dissipated, supplied = drag.add_mean_drag(*middle, line.length[a], *how, vector, matrix, scratch)
         sums[DRAG] += h * dissipated
         sums[CURRENT] += h * supplied
@@ -121,9 +123,9 @@ def add_mean_loads(line, water, first, count, h, old, new, middle, ends, mean, f
         for m in range(count):
             e = first + m
             rows = lane(ends, m), lane(mean, m)[STRAINS], lane(final, m)[STRAINS]
-            into = lane(vector, m), lane(matrix, m), (lane(scratch[0], m),)
+            ours = lane(vector, m), lane(matrix, m), (lane(scratch[0], m),)
             on_bed = loads.bed, e, line.length[e], h, *_heights(e, old, new)
-            lane(sums, m)[CONTACT] += bed.add_mean_contact(*on_bed, *rows, fresh, sharp, *into)
+            lane(sums, m)[CONTACT] += bed.add_mean_contact(*on_bed, *rows, *want, *ours)
 
 
 @inner

@@ -181,13 +181,14 @@ def add_press_stiffness(points, sag_row, matrix, row):
 
 
 @inner
-def add_mean_contact(bed, e, h, dt, old, new, ends, mean_row, new_row, fresh, sharp, vector, matrix, scratch):
+def add_mean_contact(bed, e, h, dt, old, new, ends, mean_row, new_row, with_tangent, newton_friction, vector, matrix, scratch):
     """Reaction of the bed on element e over a step: discrete gradient of the potential, damping and friction.
 
     `old`, `new` (3,): z of the two nodes and sag before and after; `ends` (2, 6) mean velocities; `mean_row`, `new_row` (9,) gradients
     of the sag, averaged over the step and at its end; h: length of the element, dt: of the step. The dashpot's force is damping * z'
     times the elastic force: it acts in contact only, and at most takes that force away. Friction is Coulomb's, regularised.
-    Tangent if `fresh`; that of friction is Newton's if `sharp`, else one that never underrates it, with which no correction overshoots.
+    Tangent if `with_tangent`; that of friction is Newton's if `newton_friction`, else one that never underrates it, with which no
+    correction overshoots.
     `scratch`: one of (3, 12). Returns the work dissipated [J].
     """
     diameter, weight = bed.diameter[e], bed.bearing[e]
@@ -203,7 +204,7 @@ def add_mean_contact(bed, e, h, dt, old, new, ends, mean_row, new_row, fresh, sh
             continue
         share = h * _WEIGHTS[k]
         expand(mean_row, row)
-        if fresh:
+        if with_tangent:
             expand(new_row, row_new)
         for i in range(12):
             row[i] *= x * y
@@ -220,33 +221,43 @@ def add_mean_contact(bed, e, h, dt, old, new, ends, mean_row, new_row, fresh, sh
         dissipated += share * (total - force) * rate * dt
         for i in range(12):
             vector[i] += share * total * row[i]
-        if fresh:
+        if with_tangent:
             add_outer(matrix, share * (slope * hardening + (force * bed.damping / dt if hardening > 0.0 else 0.0)), row, row_new)
         if bed.friction > 0.0:
-            vx = y * ends[0, 0] + x * ends[1, 0]
-            vy = y * ends[0, 1] + x * ends[1, 1]
-            speed = math.sqrt(vx * vx + vy * vy + bed.friction_speed * bed.friction_speed)
-            grip = share * bed.friction / speed
-            f = grip * force
-            dissipated += f * (vx * vx + vy * vy) * dt
-            bent = 1.0 / (speed * speed) if sharp else 0.0
-            for i in range(2):
-                v_i = vx if i == 0 else vy
-                vector[i] += y * f * v_i
-                vector[6 + i] += x * f * v_i
-                for j in range(2 if fresh else 0):
-                    v_j = vx if j == 0 else vy
-                    k_ij = f / dt * ((1.0 if i == j else 0.0) - v_i * v_j * bent)
-                    matrix[i, j] += y * y * k_ij
-                    matrix[i, 6 + j] += x * y * k_ij
-                    matrix[6 + i, j] += x * y * k_ij
-                    matrix[6 + i, 6 + j] += x * x * k_ij
-                if fresh and sharp:
-                    for j in range(12):
-                        pressed = grip * v_i * slope * row_new[j]
-                        matrix[i, j] += y * pressed
-                        matrix[6 + i, j] += x * pressed
+            dissipated += _add_friction(bed, x, share, dt, force, slope, ends, row_new, with_tangent, newton_friction, vector, matrix)
     return dissipated
+
+
+@inner
+def _add_friction(bed, x, share, dt, force, slope, ends, row_new, with_tangent, newton_friction, vector, matrix):
+    """Add Coulomb friction at x, regularised, under the elastic reaction `force` per length, whose derivative is `slope`, over `share` [m].
+
+    Arguments else as in `add_mean_contact`; row_new (12,): gradient of the point's depth. Returns the work dissipated [J].
+    """
+    y = 1.0 - x
+    vx = y * ends[0, 0] + x * ends[1, 0]
+    vy = y * ends[0, 1] + x * ends[1, 1]
+    speed = math.sqrt(vx * vx + vy * vy + bed.friction_speed * bed.friction_speed)
+    grip = share * bed.friction / speed
+    f = grip * force
+    bent = 1.0 / (speed * speed) if newton_friction else 0.0
+    for i in range(2):
+        v_i = vx if i == 0 else vy
+        vector[i] += y * f * v_i
+        vector[6 + i] += x * f * v_i
+        for j in range(2 if with_tangent else 0):
+            v_j = vx if j == 0 else vy
+            k_ij = f / dt * ((1.0 if i == j else 0.0) - v_i * v_j * bent)
+            matrix[i, j] += y * y * k_ij
+            matrix[i, 6 + j] += x * y * k_ij
+            matrix[6 + i, j] += x * y * k_ij
+            matrix[6 + i, 6 + j] += x * x * k_ij
+        if with_tangent and newton_friction:
+            for j in range(12):
+                pressed = grip * v_i * slope * row_new[j]
+                matrix[i, j] += y * pressed
+                matrix[6 + i, j] += x * pressed
+    return f * (vx * vx + vy * vy) * dt
 
 
 @inner

@@ -27,7 +27,7 @@ _STILL = 1e-300  # of a square of a speed
 def drag(v_r, tangent, tangential, normal):
     """Drag force per length on the water [N/m] for relative velocity `v_r` and unit tangent t1, all in e.
 
-    `tangential`, `normal` are rho d D_1 / 2 and rho d D_2 / 2 [N s^2/m^3]. The pipe feels minus this force; force . v_r >= 0.
+    `tangential`, `normal` are rho d D_1 / 2 and rho d D_2 / 2 [N s^2/m^3], eq. (30). The pipe feels minus this force; force . v_r >= 0.
     Also returns the coefficients (a, b, c) of the derivative  d force / d v_r = a I + b t t^T + c v_n v_n^T,  and v_n.
     """
     v_t = dot(v_r, tangent)
@@ -61,8 +61,8 @@ def _by_tangent(v_r, tangent, a, c, v_n, tangential, d_t):
 
 
 @inner
-def add_mean_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate, fresh, vector, matrix, scratch):
-    """Add minus the mean force on an element over a step to `vector` (12,) and, if `fresh`, its tangent to `matrix` (12, 12).
+def add_mean_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities, rate, with_tangent, vector, matrix, scratch):
+    """Add minus the mean force on an element over a step to `vector` (12,) and, if `with_tangent`, its tangent to `matrix` (12, 12).
 
     rm, u, psi: frame, chord in it and relative rotation; `ends` (2, 6) velocities (v, w) of the nodes; `depths` (2,) their z;
     `rate` = d velocity / d unknown [1/s]; scratch: two (3, 12).
@@ -89,10 +89,10 @@ def add_mean_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities,
         v_r = subtract(v, v_c)  # eq. (31)
         force, a, b, c, v_n = drag(v_r, tangent, coefficients[0], coefficients[1])
         force = scale(0.5 * h, force)
-        dissipated += dot(force, v_r)
+        dissipated += dot(force, v_r)  # eqs. (82), (84), parted
         supplied -= dot(force, v_c)
         add_linked(x, d, bow, force, vector)
-        if not fresh:
+        if not with_tangent:
             continue
         linked_motion(x, d, bow, moves)
         slope = _by_velocity(tangent, a, b, c, v_n)

@@ -12,7 +12,9 @@ from ..simd.columns import attitude, chord
 
 @kernel
 def static_system(line, water, position, quaternion, diagonal, lower, upper, residual, pull):
-    """Fill the tangent (n, 6, 6), (n-1, 6, 6) x 2 and residual (n, 6) = internal - external forces; boundary rows untouched.
+    """Fill the tangent (n, 6, 6), (n-1, 6, 6) x 2 and residual (n, 6) = internal - external forces, eq. (94).
+
+    Boundary rows are untouched.
 
     position (n, 3), quaternion (n, 4); `pull` (n, 6) is filled with minus the drag, which the residual contains.
     Returns the potentials [J], elastic and those of loads.ENERGIES; the drag of the current has none. The tangent is exact.

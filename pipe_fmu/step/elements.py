@@ -20,7 +20,7 @@ _NO_MOTION = 1e-300  # square of a motion
 
 
 @inner
-def add_elements(line, water, first, count, h, old, new, fresh, sharp, system, sums, peaks):
+def add_elements(line, water, first, count, h, old, new, with_tangent, newton_friction, system, sums, peaks):
     """Add internal forces and loads of the `count` elements from `first` on to `system`; arrays as in step.system.assemble.
 
     Adds works to `sums` (len(WORKS),), and raises `peaks` (2,) to the largest force and moment at an end of an element.
@@ -37,30 +37,31 @@ def add_elements(line, water, first, count, h, old, new, fresh, sharp, system, s
     strains(rm, u, psi, length, share, stress)
     for k in range(ROWS):
         new_strain[k, a] = stress[k]
-    if fresh:
+    if with_tangent:
         gradients(rm, u, psi, length, share, final)
     ahead = _stress(line, h, a, strain, new_strain, stress, sums)
-    _mean_force(a, b, length, share, d, moves, turned, strain, new_strain, fresh or by_sag, stress, mean, nine)
+    _mean_force(a, b, length, share, d, moves, turned, strain, new_strain, with_tangent or by_sag, stress, mean, nine)
     expand(nine, vector)
     for i in range(3):
         peaks[0] = max(peaks[0], math.fabs(vector[i]))
         peaks[1] = max(peaks[1], math.fabs(vector[3 + i]))
     middle = frame(attitude(turned[MIDDLE], a), attitude(turned[MIDDLE], b), add(d, scale(0.5, dd)))
-    if fresh:
+    if with_tangent:
         if by_sag:
             press_mean_sag(line.loads, first, count, line.length, h, old, new, stress)
         _tangent(line, a, middle, share, stress, ahead, mean, final, square)
         expand_matrix(square, twelve)
     for i in range(6):
         ends[0, i], ends[1, i] = moves[i, a] / h, moves[i, b] / h
-    add_mean_loads(line, water, first, count, h, old, new, middle, ends, mean, final, fresh, sharp, vector, twelve, drags, sums)
-    if fresh:
+    want, into = (with_tangent, newton_friction), (vector, twelve, drags, sums)
+    add_mean_loads(line, water, first, count, (h, old, new), middle, ends, (mean, final), want, into)
+    if with_tangent:
         turn_columns(left_jacobian(vector_of(moves, 3, a)), twelve, 12, 3)
         turn_columns(left_jacobian(vector_of(moves, 3, b)), twelve, 12, 9)
     diagonal, lower, upper, residual = system
     for m in range(count):
         add_vector(residual, first + m, lane(vector, m))
-        if fresh:
+        if with_tangent:
             add_matrix(diagonal, lower, upper, first + m, lane(twelve, m))
 
 
@@ -100,15 +101,14 @@ def _stress(line, h, a, strain, new_strain, stress, sums):
     """Mean section forces times length into `stress` (7,), with the works of damping; returns d stress / d strain over length x stiffness
     less a half."""
     length = line.length[a]
-    late = line.numerical_damping
     lag = line.damping[a] if line.damping.shape[0] > 0 else 0.0 * length
-    ahead = lag / h + late
+    ahead = lag / h + line.numerical_damping
     for k in range(STRAINS):
         modulus = length * line.stiffness[k, a]
         change = new_strain[k, a] - strain[k, a]
-        stress[k] = modulus * (0.5 * (strain[k, a] + new_strain[k, a]) + ahead * change)
+        stress[k] = modulus * (0.5 * (strain[k, a] + new_strain[k, a]) + ahead * change)  # eqs. (20), (21)
         sums[INTERNAL] += modulus * lag / h * change * change
-        sums[NUMERICAL] += modulus * late * change * change
+        sums[NUMERICAL] += modulus * line.numerical_damping * change * change
     stress[STRAINS] = even_on_sag(line.loads, a, length)
     return ahead
 

@@ -6,8 +6,8 @@ from ..loads import NO_ENERGY, potentials, summed
 
 
 @inner
-def energies(line, position, quaternion, velocity, rate, flow, strain):
-    """Energies [J] of a state, in the order of state.ENERGIES; arrays as in step.system.step_system."""
+def energies(line, position, quaternion, velocity, rate, added_mass_velocity, strain):
+    """Energies [J] of a state, eq. (71), in the order of state.ENERGIES; arrays as in step.system.step_system."""
     kinetic, elastic, stored = 0.0, 0.0, NO_ENERGY
     n = position.shape[0]
     for e in range(n - 1):
@@ -19,6 +19,6 @@ def energies(line, position, quaternion, velocity, rate, flow, strain):
         for k in range(3):  # eq. (72)
             kinetic += 0.5 * line.mass[i] * velocity[i, k] ** 2
             kinetic += 0.5 * line.inertia[i, k] * rate[i, k] ** 2
-            if flow.shape[0] > 0:
-                kinetic += 0.5 * line.added_mass[i, k] * flow[i, k] ** 2
+            if added_mass_velocity.shape[0] > 0:
+                kinetic += 0.5 * line.added_mass[i, k] * added_mass_velocity[i, k] ** 2
     return kinetic, elastic, *stored

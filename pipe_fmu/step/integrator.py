@@ -13,7 +13,7 @@ from .state import WORKS, PipeState
 from .system import element_strains, folded
 
 STIFF = np.zeros((6, 6))  # mobility of a top that moves as it is told
-# Searches for a step's solution: the guess of the mean velocities, from those of the last three steps, and whether to go carefully
+# Searches for a step's solution: the guess of the mean velocities, from those of the last three steps, and whether to damp it
 _SEARCHES = (((3.0, -3.0, 1.0), False), ((1.0, 0.0, 0.0), True), ((0.0, 0.0, 0.0), True))
 
 
@@ -35,8 +35,8 @@ def rest(line: Line, position: Array, quaternion: Array, time: float) -> PipeSta
     strain = np.empty((n - 1, 7))
     element_strains(line, position, quaternion, strain)
     zero, still = np.zeros((n, 3)), np.zeros((n, 6))
-    flow = np.zeros((len(line.added_mass), 3))
-    return PipeState(time, position, quaternion, zero, zero, flow, strain, still, still, still, 0.0, np.zeros(len(WORKS)))
+    added_mass_velocity = np.zeros((len(line.added_mass), 3))
+    return PipeState(time, position, quaternion, zero, zero, added_mass_velocity, strain, still, still, still, 0.0, np.zeros(len(WORKS)))
 
 
 def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Array, h: float, mobility: Array = STIFF) -> StepResult:
@@ -46,9 +46,9 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     would have without the pipe, where it yields to the pipe's pull with `mobility` (6, 6), the derivative of the one by the other.
     """
     spent, flaw = 0, ""
-    for weights, careful in _SEARCHES:
+    for weights, damped in _SEARCHES:
         converged, new, force, impedance, iterations, residual = solve_step(
-            line, water, state, velocity, spin, h, mobility, weights, careful
+            line, water, state, velocity, spin, h, mobility, weights, damped
         )
         spent += iterations
         flaw = _flaw(line, state, new) if converged else ""
@@ -67,4 +67,4 @@ def _flaw(line: Line, old: PipeState, new: PipeState) -> str:
 
 def energy_of(line: Line, state: PipeState) -> tuple[float, ...]:
     """Energies [J], in the order of state.ENERGIES."""
-    return energies(line, state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain)
+    return energies(line, state.position, state.quaternion, state.velocity, state.rate, state.added_mass_velocity, state.strain)

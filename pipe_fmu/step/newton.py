@@ -23,10 +23,10 @@ INERTIAL = 1e-3  # of the terms of inertia, which the residual is measured by to
 STRETCH = 1e-14  # of the stiffness: round-off of the section forces, which the residual does not fall below
 NEAR = 1e-5  # residual from which on a tangent is kept
 MAX_CORRECTIONS = 25
-CAREFUL_CORRECTIONS = 100
+DAMPED_CORRECTIONS = 100
 SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
-SHARP = 1e-3  # residual below which a careful search takes Newton's tangent of friction
-LEAST_SHARE = 0.02  # of a correction: a careful search halves no further
+SHARP = 1e-3  # residual below which a damped search takes Newton's tangent of friction
+LEAST_SHARE = 0.02  # of a correction: a damped search halves no further
 _NOTHING = 1e-300  # J
 LOST = 1e12  # residual, and element force over the axial stiffness, from which there is no way back
 
@@ -78,8 +78,8 @@ def _elastic_round_off(line, h):
 
 @inner
 def _made(line, old, x, residual, force, works):
-    """Work of the free residual, which is the energy that the step makes, over EXCHANGED of the works and the fall of the weight and STORED
-    of the gravity and elastic energy before the step; line and `old` state in columns.
+    """Work of the free residual, which eqs. (78)-(80) of the step do not account for, over EXCHANGED of the works and the fall of the
+    weight and STORED of the gravity and elastic energy before the step; line and `old` state in columns.
     """
     n, held, z, strain = x.shape[0], SIZE if line.top_clamped else 3, old[0][2], old[5]
     made, top, fall, stored = 0.0, 0.0, 0.0, 0.0
@@ -101,15 +101,15 @@ def _made(line, old, x, residual, force, works):
 
 
 @kernel
-def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful):
+def solve_step(line, water, state, velocity, spin, h, mobility, weights, damped):
     """One step from a guess of its mean velocities: the sum of those of the last three steps times `weights`.
 
-    velocity, spin (3,), mobility (6, 6): see integrator.step; careful: see `_search`. Returns (converged, new state, force on the pipe's
+    velocity, spin (3,), mobility (6, 6): see integrator.step; damped: see `_search`. Returns (converged, new state, force on the pipe's
     top (6,), its derivative by the mean velocity (6, 6), corrections, residual); when not converged the state is the old one.
     """
     n = state.position.shape[0]
     ours = line_columns(line)
-    old, new = old_columns(state.position, state.quaternion, state.velocity, state.rate, state.flow, state.strain)
+    old, new = old_columns(state.position, state.quaternion, state.velocity, state.rate, state.added_mass_velocity, state.strain)
     x, top, works = np.empty((n, SIZE)), np.empty(SIZE), np.empty(len(WORKS))
     for k in range(3):
         top[k], top[3 + k] = h * velocity[k], h * spin[k]
@@ -122,7 +122,7 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, careful
     system = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.empty((n, SIZE))
     scratch = np.empty((n, SIZE)), np.empty(SIZE), np.empty(SIZE), np.empty((n, SIZE))
     ends = state.quaternion, h * mobility, top, force, tangent
-    converged, iterations, size = _search(line, ours, water, h, old, new, x, careful, works, ends, system, scratch)
+    converged, iterations, size = _search(line, ours, water, h, old, new, x, damped, works, ends, system, scratch)
     for i in range(3 if not line.top_clamped else 0):
         force[3 + i] = 0.0
     found = _advanced(ours, h, state, old, new, x, force, works) if converged else state
@@ -136,7 +136,7 @@ def _advanced(line, h, state, old, new, x, force, works):
     advance(line, h, old, new[0], new[1], fields)
     position, last = np.empty_like(state.position), np.empty_like(x)
     quaternion, velocity, rate = np.empty_like(state.quaternion), np.empty_like(state.velocity), np.empty_like(state.rate)
-    flow, strain = np.empty_like(state.flow), np.empty_like(state.strain)
+    added_mass_velocity, strain = np.empty_like(state.added_mass_velocity), np.empty_like(state.strain)
     for i in range(x.shape[0]):
         for k in range(3):
             position[i, k] = state.position[i, k] + x[i, k]
@@ -145,25 +145,26 @@ def _advanced(line, h, state, old, new, x, force, works):
     take(fields[0], quaternion)
     take(fields[1], velocity)
     take(fields[2], rate)
-    take(fields[3], flow)
+    take(fields[3], added_mass_velocity)
     take(new[2], strain)
     top_work = state.top_work
     for k in range(SIZE):
         top_work += force[k] * x[-1, k]
     for k in range(works.shape[0]):
         works[k] += state.works[k]
-    return PipeState(state.time + h, position, quaternion, velocity, rate, flow, strain, last, state.last, state.before, top_work, works)
+    moved = position, quaternion, velocity, rate, added_mass_velocity, strain
+    return PipeState(state.time + h, *moved, last, state.last, state.before, top_work, works)
 
 
 @kernel
-def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scratch):
+def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scratch):
     """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (simd/columns.py).
 
     The top's increment is `top` (6,) less mobility (6, 6) x the force on it; without a mobility it is prescribed, and met exactly; with
     one the force is still exactly that of the increment found, but the relation between the two is met to the last correction only.
 
     The tangent is made at the guess and kept from a residual of NEAR on; when a correction then reduces the residual by less than SLOW, it
-    is made anew for every further one. A `careful` search makes it anew always, starts with a tangent of friction with which nothing
+    is made anew for every further one. A `damped` search makes it anew always, starts with a tangent of friction with which nothing
     overshoots, and halves a correction that does not lower the residual. Fills the force on the pipe's top (6,), the tangent (6, 6) as the
     top feels it and the works (len(WORKS),). Returns (converged, corrections, residual).
 
@@ -171,21 +172,21 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
     """
     quaternion, mobility, top, force, tangent = ends
     correction, wanted, move, best = scratch
-    n, limit = x.shape[0], CAREFUL_CORRECTIONS if careful else MAX_CORRECTIONS
+    n, limit = x.shape[0], DAMPED_CORRECTIONS if damped else MAX_CORRECTIONS
     diagonal, lower, upper, residual = system
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
     least, lowest_settled, patience, last = math.inf, math.inf, PATIENCE, False
     inertial_force, inertial_moment = _inertial(ours, h, old, x, top)
     round_off = _elastic_round_off(line, h)
-    fresh = keep = n > 0  # True, but no literal, for which numba would compile the assembly once more
+    with_tangent = reuse_tangent = n > 0  # True, but no literal, for which numba would compile the assembly once more
     prescribed = True
     for i in range(SIZE):
         for j in range(SIZE):
             prescribed = prescribed and mobility[i, j] == 0.0
     for iteration in range(limit + 2):
-        sharp = not careful or size < SHARP
-        force_scale, moment_scale = assemble(ours, water, h, old, new, x, fresh, sharp, system, works)
+        newton_friction = not damped or size < SHARP
+        force_scale, moment_scale = assemble(ours, water, h, old, new, x, with_tangent, newton_friction, system, works)
         gap = 0.0
         for i in range(SIZE):
             force[i] = residual[n - 1, i]
@@ -212,16 +213,16 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
             patience -= 1 if size > 0.9 * lowest_settled else 0
             lowest_settled = min(size, lowest_settled)
         if least < math.inf and (patience == 0 or lost or iteration == limit):
-            x[:], fresh, last = best, n == 0, True
+            x[:], with_tangent, last = best, n == 0, True
             continue
-        if careful and not settled and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
+        if damped and not settled and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
             share *= 0.5
             _move(x, -share, correction)
             continue
         share, lowest = 1.0, size * force_scale
         if lost or iteration == limit:
             break
-        if fresh:
+        if with_tangent:
             hold_foot_tangent(line, quaternion, diagonal, upper)
             if not line.foot_clamped:
                 diagonal[0, 3:, :3] = 0.0  # times no displacement; beside them a held row is no pivot, and moves by round-off
@@ -229,11 +230,11 @@ def _search(line, ours, water, h, old, new, x, careful, works, ends, system, scr
                 break
             condense_top(line, diagonal[n - 1], tangent)
         elif size > SLOW * previous or size > NEAR:
-            fresh, keep = True, size <= SLOW * previous
+            with_tangent, reuse_tangent = True, size <= SLOW * previous
             continue
         if done:
             return True, iteration, size
-        fresh = careful or not keep
+        with_tangent = damped or not reuse_tangent
         condense(lower, residual)
         if prescribed:
             fine = top_correction(line, diagonal[n - 1], residual[n - 1], wanted, move)

@@ -43,13 +43,13 @@ def _mass_motion(offset, theta, r_old, dphi):
 
 
 @inner
-def _add_lever(arm, arm_new, tensor, gain, fresh, block, residual):
+def _add_lever(arm, arm_new, tensor, gain, with_tangent, block, residual):
     """Add the inertial force `gain` (3,) at the end of the node's arm, and its tangent: `tensor` (3, 3) = d gain / d displacement."""
     moment = cross(arm, gain)
     for a in range(3):
         residual[a] += gain[a]
         residual[3 + a] += moment[a]
-    if not fresh:
+    if not with_tangent:
         return
     for a in range(3):
         push = (tensor[0, a], tensor[1, a], tensor[2, a])
@@ -66,7 +66,7 @@ def _add_lever(arm, arm_new, tensor, gain, fresh, block, residual):
 
 
 @inner
-def add_nodes(line, first, count, h, old, moves, turned, fresh, diagonal, residual, sums):
+def add_nodes(line, first, count, h, old, moves, turned, with_tangent, diagonal, residual, sums):
     """Add the inertia, damping and added mass of the `count` nodes from `first` on; arrays as in step.system.assemble."""
     at = group(first)
     block, force = grid(6, 6), row(6)
@@ -74,21 +74,21 @@ def add_nodes(line, first, count, h, old, moves, turned, fresh, diagonal, residu
         force[i] = 0.0
         for j in range(6):
             block[i, j] = 0.0
-    _add_node(line, at, h, old, moves, turned, fresh, block, force, sums)
-    if fresh:
+    _add_node(line, at, h, old, moves, turned, with_tangent, block, force, sums)
+    if with_tangent:
         turn_columns(left_jacobian(vector_of(moves, 3, at)), block, 6, 3)
     for m in range(count):
         ours, our_force = lane(block, m), lane(force, m)
         for i in range(6):
             residual[first + m, i] += our_force[i]
-            for j in range(6 if fresh else 0):
+            for j in range(6 if with_tangent else 0):
                 diagonal[first + m, i, j] += ours[i, j]
 
 
 @inner
-def _add_node(line, i, h, old, moves, turned, fresh, block, residual, works):
+def _add_node(line, i, h, old, moves, turned, with_tangent, block, residual, works):
     """Inertia, rotational damping (material frame) and added mass of one node, or of a group."""
-    _, quaternion, velocity, rate, flow, _ = old
+    _, quaternion, velocity, rate, added_mass_velocity, _ = old
     tensor = grid(3, 3)
     theta = vector_of(moves, 3, i)
     r_old = matrix(attitude(quaternion, i))
@@ -97,46 +97,47 @@ def _add_node(line, i, h, old, moves, turned, fresh, block, residual, works):
     turn = apply_transposed(r_old, theta)
     arm, move = _mass_motion(line.offset[i], theta, r_old, vector_of(moves, 0, i))
     arm_new = scale(line.offset[i], (r_new[0][0], r_new[1][0], r_new[2][0]))
-    pace = 2.0 * line.mass[i] / (h * h)
+    pace = 2.0 * line.mass[i] / (h * h)  # eq. (25)
     for a in range(3):
         for b in range(3):
             tensor[a, b] = pace if a == b else 0.0 * pace
     gain = scale(pace, add(move, scale(-h, vector_of(velocity, 0, i))))
-    _add_lever(arm, arm_new, tensor, gain, fresh, block, residual)
+    _add_lever(arm, arm_new, tensor, gain, with_tangent, block, residual)
     j, c = vector_of(line.inertia, 0, i), vector_of(line.spin_damping, 0, i)
     w_old = vector_of(rate, 0, i)
     w_new = add(scale(2.0 / h, turn), scale(-1.0, w_old))
-    momentum = apply(r_new, (j[0] * w_new[0], j[1] * w_new[1], j[2] * w_new[2]))
+    momentum = apply(r_new, (j[0] * w_new[0], j[1] * w_new[1], j[2] * w_new[2]))  # eqs. (26), (27)
     before = apply(r_old, (j[0] * w_old[0], j[1] * w_old[1], j[2] * w_old[2]))
-    brake = apply(r_mid, (c[0] * turn[0] / h, c[1] * turn[1] / h, c[2] * turn[2] / h))
-    works[ROTATIONAL] += (c[0] * turn[0] * turn[0] + c[1] * turn[1] * turn[1] + c[2] * turn[2] * turn[2]) / h
+    brake = apply(r_mid, (c[0] * turn[0] / h, c[1] * turn[1] / h, c[2] * turn[2] / h))  # eq. (32)
+    works[ROTATIONAL] += (c[0] * turn[0] * turn[0] + c[1] * turn[1] * turn[1] + c[2] * turn[2] * turn[2]) / h  # eq. (81)
     for a in range(3):
         residual[3 + a] += (momentum[a] - before[a]) / h + brake[a]
-        for b in range(3 if fresh else 0):
+        for b in range(3 if with_tangent else 0):
             for k in range(3):
                 block[3 + a, 3 + b] += (2.0 * j[k] / (h * h) + c[k] / h) * r_mid[a][k] * r_mid[b][k]
     if line.added_mass.shape[1] > 0:
-        m, v_flow = vector_of(line.added_mass, 0, i), vector_of(flow, 0, i)
-        _add_added_mass(m, h, v_flow, r_mid, scale(1.0 / h, turn), arm, arm_new, move, fresh, block, residual, tensor)
+        m, v_flow = vector_of(line.added_mass, 0, i), vector_of(added_mass_velocity, 0, i)
+        _add_added_mass(m, h, v_flow, r_mid, scale(1.0 / h, turn), arm, arm_new, move, with_tangent, block, residual, tensor)
 
 
 @inner
-def _add_added_mass(m, h, flow, r_mid, spin_t, arm, arm_new, move, fresh, block, residual, tensor):
-    """Added mass `m` (3,) of one node in the section's frame (Kirchhoff's equations); `flow` (3,) its old velocity there."""
+def _add_added_mass(m, h, added_mass_velocity, r_mid, spin_t, arm, arm_new, move, with_tangent, block, residual, tensor):
+    """Added mass `m` (3,) of one node in the section's frame (Kirchhoff's equations); `added_mass_velocity` (3,) its old velocity there."""
     v = apply_transposed(r_mid, scale(1.0 / h, move))
     p = (m[0] * v[0], m[1] * v[1], m[2] * v[2])
-    rate = (2.0 * m[0] * (v[0] - flow[0]) / h, 2.0 * m[1] * (v[1] - flow[1]) / h, 2.0 * m[2] * (v[2] - flow[2]) / h)
+    u = added_mass_velocity
+    rate = (2.0 * m[0] * (v[0] - u[0]) / h, 2.0 * m[1] * (v[1] - u[1]) / h, 2.0 * m[2] * (v[2] - u[2]) / h)
     for a in range(3):
         for b in range(3):
             tensor[a, b] = 0.0
             for k in range(3):
                 tensor[a, b] += 2.0 * m[k] / (h * h) * r_mid[a][k] * r_mid[b][k]
-    _add_lever(arm, arm_new, tensor, apply(r_mid, add(rate, cross(spin_t, p))), fresh, block, residual)
+    _add_lever(arm, arm_new, tensor, apply(r_mid, add(rate, cross(spin_t, p))), with_tangent, block, residual)
     moment = apply(r_mid, cross(v, p))
     momentum, speed = apply(r_mid, p), scale(1.0 / h, move)
     for a in range(3):
         residual[3 + a] += moment[a]
-    for a in range(3 if fresh else 0):
+    for a in range(3 if with_tangent else 0):
         unit = (1.0 if a == 0 else 0.0, 1.0 if a == 1 else 0.0, 1.0 if a == 2 else 0.0)
         turned = cross(unit, momentum)
         carried = (0.5 * h * tensor[0, a], 0.5 * h * tensor[1, a], 0.5 * h * tensor[2, a])
@@ -149,7 +150,7 @@ def _add_added_mass(m, h, flow, r_mid, spin_t, arm, arm_new, move, fresh, block,
 @inner
 def advance(line, h, old, moves, turned, new):
     """Columns `new` of attitudes, velocities, body rates and added-mass velocities after the increments; see step.system.assemble."""
-    _, quaternion, velocity, rate, flow, _ = old
+    _, quaternion, velocity, rate, added_mass_velocity, _ = old
     new_quaternion, new_velocity, new_rate, new_flow = new
     for first in range(0, line.mass.shape[0], WIDTH):
         i = group(first)
@@ -163,8 +164,8 @@ def advance(line, h, old, moves, turned, new):
             new_rate[a, i] = 2.0 * turn[a] / h - rate[a, i]
         for a in range(4):
             new_quaternion[a, i] = now[a]
-        if flow.shape[1] > 0:
+        if added_mass_velocity.shape[1] > 0:
             r_mid = matrix(attitude(turned[MIDDLE], i))
             v = apply_transposed(r_mid, scale(1.0 / h, move))
             for a in range(3):
-                new_flow[a, i] = 2.0 * v[a] - flow[a, i]
+                new_flow[a, i] = 2.0 * v[a] - added_mass_velocity[a, i]

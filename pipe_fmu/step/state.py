@@ -26,7 +26,7 @@ class PipeState(NamedTuple):
     quaternion: Array  # (n, 4) attitude of the sections
     velocity: Array  # (n, 3) of the centres of the nodes' masses [m/s], e
     rate: Array  # (n, 3) angular velocity [rad/s], material
-    flow: Array  # (n, 3) velocity of the added mass [m/s], material; (0, 3) when absent
+    added_mass_velocity: Array  # (n, 3) velocity of the added mass [m/s], material; (0, 3) when absent
     strain: Array  # (n - 1, 7) strains and sags
     last: Array  # (n, 6) mean velocities of the last step, for the extrapolation
     before: Array  # (n, 6) those of the step before

@@ -53,7 +53,7 @@ def element_strains(line, position, quaternion, out):
 
 
 @kernel
-def old_columns(position, quaternion, velocity, rate, flow, strain):
+def old_columns(position, quaternion, velocity, rate, added_mass_velocity, strain):
     """Columns of the old state, and those that an assembly fills: increments, attitudes on the path, strains at its end."""
     n = position.shape[0]
     p = room(n)
@@ -64,7 +64,7 @@ def old_columns(position, quaternion, velocity, rate, flow, strain):
         columns(quaternion, n, 1.0),
         columns(velocity, n, 1.0),
         columns(rate, n, 1.0),
-        columns(flow, n, 1.0),
+        columns(added_mass_velocity, n, 1.0),
         columns(strain, n, 1.0),
     )
     return old, (np.empty((6, p)), np.empty((4, 4, p)), np.empty((ROWS, p)))
@@ -84,26 +84,29 @@ def folded(length, old, new):
 
 
 @kernel
-def step_system(line, water, h, position, quaternion, velocity, rate, flow, strain, x, new_strain, fresh, sharp, system, works):
-    """Residual of the step for trial increments `x` (n, 6), and the tangent if `fresh`, into `system` = (diagonal, lower, upper, residual).
+def step_system(
+    line, water, h, position, quaternion, velocity, rate, added_mass_velocity, strain, x, new_strain, with_tangent, newton_friction,
+    system, works,
+):  # fmt: skip
+    """Residual of the step for trial increments `x` (n, 6), and the tangent if asked for, into `system`: diagonal, lower, upper, residual.
 
-    `sharp`: see loads.bed.add_mean_contact.
+    `newton_friction`: see loads.bed.add_mean_contact.
 
-    position, velocity (n, 3), quaternion (n, 4), rate (n, 3) body rates, flow (n, 3) or (0, 3) body velocity of the added mass,
+    position, velocity (n, 3), quaternion (n, 4), rate (n, 3) body rates, added_mass_velocity (n, 3) or (0, 3) in the section's frame,
     strain (n - 1, 7): old state. Fills new_strain (n - 1, 7) and works (len(WORKS),). Returns (force scale [N], moment scale [N m]).
     """
-    old, new = old_columns(position, quaternion, velocity, rate, flow, strain)
-    scales = assemble(line_columns(line), water, h, old, new, x, fresh, sharp, system, works)
+    old, new = old_columns(position, quaternion, velocity, rate, added_mass_velocity, strain)
+    scales = assemble(line_columns(line), water, h, old, new, x, with_tangent, newton_friction, system, works)
     take(new[2], new_strain)
     return scales
 
 
 @inner
-def assemble(line, water, h, old, new, x, fresh, sharp, system, works):
-    """`step_system` on columns (simd/columns.py)."""
+def assemble(line, water, h, old, new, x, with_tangent, newton_friction, system, works):
+    """`step_system`, the weak form (91)-(93) of a step, on columns (simd/columns.py)."""
     moves, turned, _ = new
     diagonal, lower, upper, residual = system
-    if fresh:
+    if with_tangent:
         clear(diagonal, lower, upper)
     residual[:] = 0.0
     n = x.shape[0]
@@ -115,9 +118,9 @@ def assemble(line, water, h, old, new, x, fresh, sharp, system, works):
     for k in range(2):
         peaks[k] = 0.0
     for first in range(0, n - 1, WIDTH):
-        add_elements(line, water, first, min(WIDTH, n - 1 - first), h, old, new, fresh, sharp, system, sums, peaks)
+        add_elements(line, water, first, min(WIDTH, n - 1 - first), h, old, new, with_tangent, newton_friction, system, sums, peaks)
     for first in range(0, n, WIDTH):
-        add_nodes(line, first, min(WIDTH, n - first), h, old, moves, turned, fresh, diagonal, residual, sums)
+        add_nodes(line, first, min(WIDTH, n - first), h, old, moves, turned, with_tangent, diagonal, residual, sums)
     for k in range(_COUNT):
         works[k] = total(sums[k])
     return largest(peaks[0]), largest(peaks[1])
