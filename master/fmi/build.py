@@ -34,7 +34,7 @@ from .document import icon_png, page_html
 from .portable import EPOCH
 
 HERE = Path(__file__).parent
-BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py", "server.py", "step/state.py")
+BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py", "server.py", "state.py")
 LINUX = "binaries/linux64/"
 CAPABILITIES = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
 
