@@ -1,8 +1,13 @@
 """The program: `pipelay`, or `python -m master`. From here on Ctrl-C ends it in one line, while `master.command_line` loads too."""
 
 import os
-import signal
 import sys
+
+if __name__ == "__main__" and os.name == "posix" and not sys.flags.safe_path:
+    # begin anew without the working folder, whose modules Python would prefer
+    os.execv(sys.executable, [sys.executable, "-P", *sys.orig_argv[1:]])
+
+import signal
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -28,6 +33,4 @@ def _interrupted(*_: object) -> None:
 
 
 if __name__ == "__main__":
-    if os.name == "posix" and not sys.flags.safe_path:  # begin anew without the working folder, whose modules Python would prefer
-        os.execv(sys.executable, [sys.executable, "-P", *sys.orig_argv[1:]])
     sys.exit(program())

@@ -152,6 +152,7 @@ def program() -> int:
 
 def _perform(options: argparse.Namespace) -> int:
     os.environ.pop("NUMBA_DISABLE_JIT", None)  # the kernels can only run compiled
+    os.environ["PYTHONSAFEPATH"] = "1"  # no process of ours takes modules of the working folder
     try:
         with breakable():
             from master import commands

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from master import scene as scenes_of
-from master.errors import RunError, UsageError
+from master.errors import RunError, UsageError, broken_arithmetic
 from master.fmi.system import EXPORTED, write_system
 from master.folders import SCRATCH, taken, unwritable
 from master.interrupts import postponed
@@ -39,7 +39,7 @@ def statics(options: argparse.Namespace) -> int:
     scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     from master.statics import report  # works with the units' packages, which a run never imports
 
-    with patience(terminal()):
+    with patience(terminal()), broken_arithmetic("statics"):
         found = report(scene)
     say(json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found), result=True)
     return 0
@@ -133,8 +133,8 @@ def _folder(path: Path) -> Path:
                 raise UsageError(f"--output = {str(path)!r}: {place} is a file, not a folder")
             if place.is_symlink():
                 raise UsageError(f"--output = {str(path)!r}: {place} is a link to nothing")
-    except (OSError, ValueError) as error:  # a name too long, a folder that may not be entered, a null character
-        raise UsageError(f"--output = {str(path)!r}: cannot be written ({getattr(error, 'strerror', error)})") from None
+    except OSError as error:  # a name too long, a folder that may not be entered
+        raise UsageError(f"--output = {str(path)!r}: cannot be written ({error.strerror})") from None
     return path
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +48,9 @@ def bury(folder: Path, death: Death, status: str = "died") -> str:
         "interface_residual_J": float(table.column("interface_residual_sum")[-1]),
         "ledger_closure_J": float(abs(table.column("closure")).max()),
     }
-    figures.draw_all(folder, table, None, (), kinds)
-    write_summary(folder / "summary.json", found)
+    signals = folder / "signals.csv"
+    with suppress(OSError):  # of a full disk
+        os.truncate(signals, signals.read_bytes().rfind(b"\n") + 1)  # within whose last line it may have ended
+        write_summary(folder / "summary.json", found)
+        figures.draw_all(folder, table, None, (), kinds)
     return f" at t = {time:g} s; results so far in {folder}"

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from master.errors import RunError, UsageError
+from master.errors import RunError, UsageError, broken_arithmetic
 from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
 from master.fmi.runtime import end_with_reader
 from master.fmi.schema import to_mapping
@@ -37,9 +37,11 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
     from master import statics  # of the packages that now stand in
     from pipe_fmu.slave import PipeUnit
 
-    statics.parameters(scene)  # refused before the kernels take their minute
+    with broken_arithmetic("parameters"):
+        statics.parameters(scene)  # refused before the kernels take their minute
     compile_kernels()
-    at = statics.released(scene, statics.equilibrium(scene))
+    with broken_arithmetic("statics"):
+        at = statics.released(scene, statics.equilibrium(scene))
     simulation = scene.sections.simulation
     experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
     pull = (0.0 - at.found.top).tolist()  # no -0.0 among them

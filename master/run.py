@@ -11,7 +11,7 @@ import os
 import tempfile
 import time as clock
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -66,10 +66,9 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
             try:
                 return _simulated(scene, folder, Path(scratch), screen)
             except OSError as error:  # a full disk, or a folder that is gone
-                how, left = f"could not write {error.filename or 'its results'} ({error.strerror or error})", ""
-                with suppress(OSError):
-                    left = post_mortem.bury(folder, Death(how, os.getpid()), "failed")
-                raise RunError(f"the run {how}{left}") from None
+                how = f"could not write {error.filename or 'its results'} ({error.strerror or error})"
+                left = post_mortem.bury(folder, Death(how, os.getpid()), "failed")
+                raise RunError(f"the process {how}{left}") from None
 
 
 def _simulated(scene: Scene, folder: Path, scratch: Path, screen: TextIO) -> Result:

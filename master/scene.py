@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -37,6 +38,7 @@ FOUND = {
 }
 """Parameters of the units that a scene may not give, and where they come from."""
 DEEPEST = 20  # tables and lists within one another
+LEAST, LARGEST = 1e-30, 1e30  # amount of a number of pipe and vessel, beyond any in SI units: the products of a few are finite
 
 
 class SceneError(UsageError):
@@ -122,6 +124,9 @@ def from_mapping(mapping: dict[str, Any], name: str, folder: Path = Path()) -> S
         table, _, leaf = key.partition(".")
         if leaf in mapping.get(table, {}):
             raise SceneError(f"{key}: {origin}; must be absent")
+    for key, value in _leaves(mapping):
+        if isinstance(value, float) and math.isfinite(value) and value and not LEAST <= abs(value) <= LARGEST:
+            raise SceneError(f"{key} = {value:g}: must be 0, or in amount from {LEAST:g} to {LARGEST:g}")
     try:
         return Scene(name, build(Sections, mapping), mapping)
     except ValueError as error:
@@ -161,20 +166,27 @@ def _parse(name: str, content: bytes) -> dict[str, Any]:
 
 def _sound(mapping: dict[str, Any]) -> dict[str, Any]:
     """`mapping`, if every value in it can be looked at, printed and handed on. Raises SceneError."""
-    level: list[tuple[str, Any]] = list(mapping.items())
+    for path, value in _leaves(mapping):
+        if isinstance(value, int) and value.bit_length() > 64:
+            raise SceneError(f"{path} has {value.bit_length()} bits: must be finite, an integer within 64 bits")
+    return mapping
+
+
+def _leaves(mapping: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Every value that is no table and no list, with its place. Raises SceneError where tables and lists lie too deep."""
+    level = list(mapping.items())
     for _ in range(DEEPEST):
         inner: list[tuple[str, Any]] = []
         for path, value in level:
-            if isinstance(value, int) and value.bit_length() > 64:
-                raise SceneError(f"{path} has {value.bit_length()} bits: must be finite, an integer within 64 bits")
             if isinstance(value, dict):
                 inner += [(f"{path}.{key}", item) for key, item in value.items()]
             elif isinstance(value, list):
                 inner += [(f"{path}[{i}]", item) for i, item in enumerate(value, 1)]
+            else:
+                yield path, value
         level = inner
     if level:
         raise SceneError(f"{level[0][0][:60]}...: must not nest more than {DEEPEST} tables and lists")
-    return mapping
 
 
 def _parse_change(change: str) -> dict[str, Any]:
