@@ -41,7 +41,8 @@ def statics(options: argparse.Namespace) -> int:
 
     with patience(terminal()), broken_arithmetic("statics"):
         found = report(scene)
-    say(json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found), result=True)
+        text = json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found)
+    say(text, result=True)
     return 0
 
 

@@ -82,6 +82,8 @@ class Fmu:
         location = Path(folder.name, "resources").as_uri()
         if (model.generationTool or "").startswith("PythonFMU"):  # which knows no escape but that of the blank
             location = f"file://{folder.name}/resources".replace(" ", "%20")
+            if "%20" in folder.name:  # it would crash
+                raise FmuFailed(f"{self.name}: FMUs of PythonFMU cannot be unpacked in {folder.name}; set TMPDIR to a path without %20")
         self._states: set[int] = set()
         try:
             fmpy.extract(str(path), folder.name)

@@ -197,6 +197,42 @@ def test_a_temporary_directory_of_any_name_serves(folder, expected, tmp_path):
     assert not [path for path in place.iterdir() if path.name.startswith("fmu_")]
 
 
+PLAIN = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+class Plain(Fmi2Slave):
+    def __init__(self, **given):
+        super().__init__(**given)
+        self.y = 3.0
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+    def do_step(self, time, step):
+        self.y += step
+        return True
+"""
+STEPPED = """
+import sys
+from master.fmu import Fmu, FmuFailed
+try:
+    with Fmu(sys.argv[1]) as fmu:
+        fmu.initialize()
+        fmu.step(0.0, 0.5)
+        print(*fmu.get("y"))
+except FmuFailed as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize(("name", "answer"), [("für Übles, 50 %", "3.5\n"), ("%20", "set TMPDIR to a path without %20\n")])
+def test_an_fmu_of_pythonfmus_own_library_does_so_too_or_says_why_not(tmp_path, name, answer):
+    (tmp_path / "plain.py").write_text(PLAIN)
+    program = "from pythonfmu import FmuBuilder; FmuBuilder.build_FMU('plain.py', dest='.')"  # in a process that forgets the module
+    built = ran(cwd=tmp_path, call=(sys.executable, "-c", program), PYTHONSAFEPATH="")
+    assert built.returncode == 0
+    (tmp_path / name).mkdir()
+    done = ran("Plain.fmu", cwd=tmp_path, call=(sys.executable, "-c", STEPPED), TMPDIR=str(tmp_path / name))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith(answer)
+
+
 def test_a_second_run_into_a_folder_is_refused_in_one_line(folder, tmp_path):
     first = begun(folder, tmp_path)
     for command in (tied(folder), ["export"]):
@@ -351,4 +387,5 @@ def test_what_takes_long_says_so_on_any_stream_that_is_a_terminal(monkeypatch, w
 
 
 def test_there_are_twelve_and_more():
-    assert len(GOOD) + len(BROKEN) + 8 >= 20
+    functions = [name for name in globals() if name.startswith("test_")]
+    assert len(GOOD) + len(BROKEN) + len(functions) - 3 >= 25  # two of them are counted by their kinds, one is this
