@@ -76,7 +76,10 @@ def _simulated(scene: Scene, folder: Path, scratch: Path, screen: TextIO) -> Res
     with ExitStack() as stack:
         begun = clock.perf_counter()
         calm = stack.enter_context(patience(screen))
-        simulation, drive, kept = scene.sections.simulation, *_open(scene, stack)
+        try:
+            simulation, drive, kept = scene.sections.simulation, *_open(scene, stack)
+        except OSError as error:
+            raise RunError(f"the units cannot be opened: {error}") from None
         _clear(folder)
         report.write_summary(folder / "summary.json", post_mortem.place_holder(scene.name, os.getpid(), drive.ledger.kinds))
         stream = stack.enter_context((folder / "signals.csv").open("w", encoding="utf-8"))

@@ -92,6 +92,28 @@ SCENES = {  # their names, or what is made at their place
     "below a file": (lambda at: at.touch() or at / "a.toml", "cannot be read (Not a directory)"),
 }
 
+FILES = {  # of a unit of a scene of two FMUs: TOML text, and what the line must name
+    "null character": (r'"a\u0000.fmu"', r"units.a.fmu = 'a\x00.fmu': no such file"),
+    "long name": (f'"{LONG}.fmu"', "no such file"),
+    "nothing": ('""', "units.a.fmu = '': no such file"),
+    "device": ('"/dev/null"', "units.a.fmu = '/dev/null': no such file"),
+    "escape sequence": (r'"\u001b[2J"', r"units.a.fmu = '\x1b[2J': no such file"),
+    "no archive": ('"mine.toml"', "mine.toml: not a readable FMU"),
+    "number": ("5", "units.a.fmu = 5: must be a text"),
+}
+TWO = """
+[simulation]
+duration = 1
+macro_step = 0.1
+[units]
+a = {fmu = FILE}
+b = {fmu = "b.fmu"}
+[bond]
+impedance = "a"
+mobility = "b"
+pairs = [{effort = "force", flow = "velocity", floor = 1}]
+"""
+
 
 @pytest.fixture(autouse=True)
 def nothing_computed(monkeypatch):
@@ -114,6 +136,14 @@ def test_a_file_of_another_kind(kind, tmp_path, capsys):
     content, named = CONTENTS[kind]
     (tmp_path / "mine.toml").write_bytes(content)
     refused(["statics", tmp_path / "mine.toml"] if b"units" not in content else ["run", tmp_path / "mine.toml"], named, capsys)
+    assert os.listdir(tmp_path) == ["mine.toml"]
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_unit_of_another_kind(kind, tmp_path, capsys):
+    text, named = FILES[kind]
+    (tmp_path / "mine.toml").write_text(TWO.replace("FILE", text))
+    refused(["run", tmp_path / "mine.toml", "-o", tmp_path / "out"], named, capsys)
     assert os.listdir(tmp_path) == ["mine.toml"]
 
 
@@ -157,4 +187,4 @@ def test_a_call_that_the_parser_refuses_shows_no_control_characters(word, capsys
 
 
 def test_there_are_sixty_and_more():
-    assert len(CONTENTS) + len(VALUES) + len(BAD_CHANGES) + len(FOLDERS) + len(SCENES) >= 90
+    assert len(CONTENTS) + len(VALUES) + len(BAD_CHANGES) + len(FOLDERS) + len(SCENES) + len(FILES) >= 90
