@@ -25,8 +25,8 @@ EPILOG = """examples:
   pipelay scenes                               what is built in
   pipelay keys                                 what a scene may say
 
-exit codes: 0 done and the energy check kept; 1 the computation failed or the energy check did; 2 a mistake in the call
-or the scene, named in one line."""
+exit codes: 0 done and the energy check kept; 1 the computation failed, the energy check did, or results cannot be written;
+2 a mistake in the call or the scene, named in one line."""
 
 
 class _Parser(argparse.ArgumentParser):

@@ -41,7 +41,6 @@ def bound() -> None:
             folder = cache_folder(kind)
             ages = {path: path.lstat().st_mtime for path in folder.iterdir()}
             unused = sorted((path for path in ages if ages[path] < oldest), key=ages.__getitem__)
-            with tempfile.TemporaryDirectory(dir=folder) as grave:
-                for path in unused[: max(0, len(ages) - number)]:
-                    with contextlib.suppress(OSError):  # gone already
-                        path.rename(Path(grave, path.name))  # at once, whatever is in it
+            for path in unused[: max(0, len(ages) - number)]:
+                with contextlib.suppress(OSError), tempfile.TemporaryDirectory(dir=folder) as grave:  # it may be gone already
+                    path.rename(Path(grave, path.name))  # at once, whatever is in it
