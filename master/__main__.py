@@ -1,157 +1,35 @@
-"""The command line: `pipelay`, or `python -m master`. Imports what a command needs only once it runs, see `master.guarded`."""
+"""The program: `pipelay`, or `python -m master`. From here on Ctrl-C ends it in one line, while `master.command_line` loads too."""
 
-from __future__ import annotations
-
-import argparse
 import os
 import sys
-from collections.abc import Sequence
-from pathlib import Path
 
-from master.errors import RunError, UsageError
-from master.guarded import guarded
-from master.interrupts import breakable
+if __name__ == "__main__" and os.name == "posix" and not sys.flags.safe_path:
+    # begin anew without the working folder, whose modules Python would prefer
+    os.execv(sys.executable, [sys.executable, "-P", *sys.orig_argv[1:]])
 
-EPILOG = """examples:
-  pipelay run                                  the paper's scene, 300 s; results in results/paper
-  pipelay run pipelay -o out                   the same with the seabed under the pipe
-  pipelay run --set simulation.duration=60 --set vessel.controller.x=790
-  pipelay run my-scene.toml                    a scene of your own; start from a copy of a built-in one
-  pipelay statics paper --json                 the equilibrium alone, as JSON
-  pipelay export -o fmus --scene pipelay       pipe.fmu and vessel.fmu for any FMI 2.0 master
-  pipelay scenes                               what is built in
-  pipelay keys                                 what a scene may say
-
-exit codes: 0 done and the energy check kept; 1 the computation failed or the energy check did; 2 a mistake in the call
-or the scene, named in one line."""
+import signal
 
 
-def parser() -> argparse.ArgumentParser:
-    """The commands and their options."""
-    raw = argparse.RawDescriptionHelpFormatter
-    about = "A geometrically exact offshore pipe and its vessel as two FMUs, coupled with an energy-checked master."
-    top = argparse.ArgumentParser("pipelay", description=about, epilog=EPILOG, formatter_class=raw)
-    subparsers = top.add_subparsers(metavar="COMMAND", required=True)
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command in this process and return its exit code."""
+    from master.command_line import main
 
-    def command(name: str, short: str, epilog: str) -> argparse.ArgumentParser:
-        added = subparsers.add_parser(name, help=short, description=short, epilog=epilog, formatter_class=raw)
-        added.set_defaults(command=name.replace("-", "_"))  # a function of `master.commands`
-        return added
-
-    run = command(
-        "run",
-        "Simulate a scene; write signals, shapes, figures and a summary.",
-        "files written: signals.csv, shapes.npz, fig3_*.png to fig9_*.png, energy.png, summary.json\n\n"
-        "Ctrl-C ends a run early and keeps what was computed.",
-    )
-    _scene_arguments(run, optional=True)
-    run.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the results (default: results/SCENE)")
-
-    statics = command(
-        "statics",
-        "Find the static equilibrium of a scene and print its forces.",
-        "Forces and moments act on the pipe; components are x forward, y starboard, z down.",
-    )
-    _scene_arguments(statics, optional=False)
-    statics.add_argument("--json", action="store_true", help="print JSON, with arrays over the nodes")
-
-    export = command(
-        "export",
-        "Write the units of a scene as FMUs (FMI 2.0 co-simulation).",
-        "The equilibrium of the scene is built in as the start of both FMUs.",
-    )
-    export.add_argument("--scene", default="paper", metavar="SCENE", help="scene the FMUs belong to (default: paper)")
-    _set_argument(export)
-    export.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path(), help="folder (default: here)")
-    portable = "put Python and compiled kernels into the FMUs, for machines without them (Linux x86-64; 100 MB each)"
-    export.add_argument("--portable", action="store_true", help=portable)
-
-    command(
-        "scenes", "List the built-in scenes.", "Copy one of their files for a scene of your own; `pipelay keys` lists what it may say."
-    )
-    command(
-        "keys", "List what a scene of pipe and vessel may say: keys, defaults, units.", "Lists of tables have [] behind their names."
-    )
-    stability = command(
-        "stability",
-        "Run the coupling's stability cases; write their tables and a stability map.",
-        "files written: published.csv, limits.csv, stability_map.csv, stability_map.png, bodies.csv; all of it takes about ten minutes",
-    )
-    _study_arguments(stability, "oscillator, schueller, quarter-car, manipulator, limits, bodies")
-
-    hard = command(
-        "hard-cases",
-        "Run the pipe alone where simulations of lines fail, each case at three steps.",
-        "file written: hard-cases.csv; all of it takes ten seconds once compiled",
-    )
-    _study_arguments(hard, "the cases by their names")
-    measured = command(
-        "bench",
-        "Measure CPU time against error, beside other codes; costs of nodes, of physics and of the start.",
-        "files written: CASE.csv, and CASE.png where error is measured; all of it takes half an hour",
-    )
-    _study_arguments(measured, "heave, snap, paper, statics, costs, nodes, start")
-    return top
-
-
-def _scene_arguments(to: argparse.ArgumentParser, *, optional: bool) -> None:
-    short = "a built-in name (see `pipelay scenes`) or a .toml file"
-    if optional:
-        to.add_argument("scene", nargs="?", default="paper", metavar="SCENE", help=f"{short} (default: paper)")
-    else:
-        to.add_argument("scene", metavar="SCENE", help=short)
-    _set_argument(to)
-
-
-def _study_arguments(to: argparse.ArgumentParser, cases: str) -> None:
-    to.add_argument("cases", nargs="*", metavar="CASE", help=f"{cases} (default: all)")
-    folder = Path("results") / to.prog.split()[-1]
-    to.add_argument("-o", "--output", metavar="DIR", type=Path, default=folder, help="folder of the tables")
-
-
-def _set_argument(to: argparse.ArgumentParser) -> None:
-    about = "change one value of the scene: dotted key, TOML value; may be repeated"
-    to.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes", help=about)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code; mistakes and failures become one line on the error stream."""
-    return _perform(parser().parse_args(arguments))
+    return main(arguments)
 
 
 def program() -> int:
-    """`main` for the shell, in a process of its own: even where that dies a line on the error stream says so, with exit code 1."""
-    options = parser().parse_args()
-    ended = guarded(lambda: _perform(options))
-    if isinstance(ended, int):
-        return ended
-    from master import commands, post_mortem
+    """Run the command of the shell's call in a process of its own and return its exit code."""
+    for which in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(which, _interrupted)
+    from master.command_line import program
 
-    left = post_mortem.bury(commands.run_folder(options), ended) if options.command == "run" else ""
-    return _complain(f"the process {ended.how}{left}", 1)
+    return program()
 
 
-def _perform(options: argparse.Namespace) -> int:
-    os.environ.pop("NUMBA_DISABLE_JIT", None)  # the kernels can only run compiled
-    try:
-        with breakable():
-            from master import commands
-
-            return int(getattr(commands, options.command)(options))
-    except UsageError as error:
-        return _complain(str(error), 2)
-    except RunError as error:
-        return _complain(str(error), 1)
-    except KeyboardInterrupt:
-        return _complain("interrupted", 1)
-    except BrokenPipeError:  # the reader of our output went away, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-
-
-def _complain(message: str, code: int) -> int:
-    sys.stderr.write(f"pipelay: {message}\n")
-    return code
+def _interrupted(*_: object) -> None:
+    """Before there is anything to close."""
+    os.write(2, b"pipelay: interrupted\n")
+    os._exit(1)
 
 
 if __name__ == "__main__":

@@ -5,17 +5,17 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 from master import scene as scenes_of
-from master.errors import RunError, UsageError
+from master.errors import RunError, UsageError, broken_arithmetic
 from master.fmi.system import EXPORTED, write_system
-from master.folders import gone_if_empty
+from master.folders import SCRATCH, taken, unwritable
 from master.interrupts import postponed
 from master.prepared import prepare
+from master.screen import patience, say, terminal
 
 
 def run(options: argparse.Namespace) -> int:
@@ -24,8 +24,8 @@ def run(options: argparse.Namespace) -> int:
     folder = _folder(run_folder(options))
     from master.run import simulate  # matplotlib and FMPy take a second to import: not for `scenes` or a bad scene
 
-    result = simulate(scene, folder, sys.stderr)
-    _say(f"{result.screen}\nresults in {folder}")
+    result = simulate(scene, folder, terminal())
+    say(f"{result.screen}\nresults in {folder}")
     return 0 if result.passed else 1
 
 
@@ -39,8 +39,10 @@ def statics(options: argparse.Namespace) -> int:
     scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     from master.statics import report  # works with the units' packages, which a run never imports
 
-    found = report(scene)
-    _say(json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found))
+    with patience(terminal()), broken_arithmetic("statics"):
+        found = report(scene)
+        text = json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found)
+    say(text, result=True)
     return 0
 
 
@@ -48,19 +50,18 @@ def export(options: argparse.Namespace) -> int:
     """Write the FMUs of a scene, and the files that connect them, into a folder: all or none, instead of those of another export."""
     scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
     folder = _folder(options.output)
-    with gone_if_empty(folder):
+    with taken(folder):
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            unfinished = tempfile.TemporaryDirectory(prefix=".pipelay_", dir=folder)
+            unfinished = tempfile.TemporaryDirectory(prefix=SCRATCH, dir=folder)
         except OSError as error:
-            raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-        with unfinished as place:
+            raise unwritable(folder, error) from None
+        with unfinished as place, patience(terminal()):
             fmus = prepare(scene, ["--export", place, *(["--portable"] if options.portable else [])])
             simulation = scene.sections.simulation
             joined = write_system(fmus, Path(place), simulation.macro_step, simulation.duration) if "vessel" in fmus else []
             written = _moved([*fmus.values(), *joined], folder)
     for path in written:
-        _say(str(path))
+        say(str(path))
     return 0
 
 
@@ -82,8 +83,8 @@ def scenes(options: argparse.Namespace) -> int:
     found = scenes_of.built_in()
     width = max(map(len, found))
     for name, title in found.items():
-        _say(f"{name:{width}}  {title}")
-    _say(f"files in {scenes_of.BUILT_IN}")
+        say(f"{name:{width}}  {title}", result=True)
+    say(f"files in {scenes_of.BUILT_IN}", result=True)
     return 0
 
 
@@ -91,7 +92,7 @@ def keys(options: argparse.Namespace) -> int:
     """List what a scene may say."""
     from master.keys import listing
 
-    _say(listing())
+    say(listing(), result=True)
     return 0
 
 
@@ -117,18 +118,24 @@ def _study(options: argparse.Namespace, module: str) -> int:
     for name in options.cases:
         if name not in cases.NAMES:
             raise UsageError(f"case = {name!r}: must be one of {', '.join(map(repr, cases.NAMES))}")
-    text, kept = cases.study(options.cases, folder, sys.stderr)
-    _say(f"{text}\ntables in {folder}")
+    with taken(folder), patience(terminal()):
+        text, kept = cases.study(options.cases, folder, terminal())
+    say(f"{text}\ntables in {folder}")
     return 0 if kept else 1
 
 
 def _folder(path: Path) -> Path:
-    """`path`, if it is a folder or can become one."""
-    for place in (path, *path.parents):
-        if place.is_dir():
-            return path
-        if place.exists():
-            raise UsageError(f"--output = {str(path)!r}: {place} is a file, not a folder")
+    """`path`, if it is a folder or can become one. Raises UsageError."""
+    try:
+        for place in (path, *path.parents):
+            if place.is_dir():
+                return path
+            if place.exists():
+                raise UsageError(f"--output = {str(path)!r}: {place} is a file, not a folder")
+            if place.is_symlink():
+                raise UsageError(f"--output = {str(path)!r}: {place} is a link to nothing")
+    except OSError as error:  # a name too long, a folder that may not be entered
+        raise UsageError(f"--output = {str(path)!r}: cannot be written ({error.strerror})") from None
     return path
 
 
@@ -153,7 +160,3 @@ def _statics_table(scene: scenes_of.Scene, found: dict[str, Any]) -> str:
             f"  touchdown at    {'no seabed contact' if touchdown is None else f'S = {touchdown:.1f} m'}",
         )
     )
-
-
-def _say(text: str) -> None:
-    sys.stdout.write(text + "\n")

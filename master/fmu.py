@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
 import tempfile
 import weakref
 from collections import deque
@@ -78,8 +79,11 @@ class Fmu:
         self.has_derivatives = bool(model.coSimulation.providesDirectionalDerivative)
         self.can_vary_step = bool(model.coSimulation.canHandleVariableCommunicationStepSize)
         folder = tempfile.TemporaryDirectory(prefix="fmu_")
-        if "%" in Path(folder.name).as_uri().replace("%20", " "):  # PythonFMU knows no other escape, and would crash
-            raise FmuFailed(f"{folder.name}: FMUs cannot be unpacked here; set TMPDIR to a plain ASCII path")
+        location = Path(folder.name, "resources").as_uri()
+        if (model.generationTool or "").startswith("PythonFMU"):  # which knows no escape but that of the blank
+            location = f"file://{folder.name}/resources".replace(" ", "%20")
+            if "%20" in folder.name:  # it would crash
+                raise FmuFailed(f"{self.name}: FMUs of PythonFMU cannot be unpacked in {folder.name}; set TMPDIR to a path without %20")
         self._states: set[int] = set()
         try:
             fmpy.extract(str(path), folder.name)
@@ -89,7 +93,11 @@ class Fmu:
                 unzipDirectory=folder.name,
                 instanceName=self.name,
             )
-            self._fmu.instantiate(callbacks=_callbacks(self.messages), loggingOn=True)
+            self._fmu.callbacks = _callbacks(self.messages)
+            words = self.name.encode(), fmi2.fmi2CoSimulation, model.guid.encode(), os.fsencode(location)
+            self._fmu.component = self._fmu.fmi2Instantiate(*words, ctypes.byref(self._fmu.callbacks), False, True)
+            if not self._fmu.component:
+                raise FmuFailed("failed to instantiate")
         except Exception as error:  # as above; the FMU's own words are in the log
             folder.cleanup()
             raise FmuFailed(f"{self.name}: cannot be loaded: {self._words(str(error))}") from None

@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from master.interrupts import SIGNALS
+from master.interrupts import SIGNALS, block, unblock
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,7 @@ def guarded(work: Callable[[], int]) -> int | Death:
     if not hasattr(os, "fork"):
         return work()
     heard, told = os.pipe()
+    block()  # until there is somebody in either process to take them
     child = os.fork()
     if child == 0:
         os.close(heard)
@@ -50,6 +51,7 @@ def guarded(work: Callable[[], int]) -> int | Death:
 
     for which in SIGNALS:
         signal.signal(which, pass_on)
+    unblock()
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if code < 0:
         return Death(f"was ended by {signal.Signals(-code).name}", child)

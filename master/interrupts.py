@@ -35,6 +35,7 @@ def breakable() -> Iterator[None]:
 
     with _handling(stop):
         try:
+            unblock()  # what came while this process began comes now
             yield
         except RunError:
             if _asked.is_set():
@@ -42,6 +43,17 @@ def breakable() -> Iterator[None]:
             raise
         finally:
             _asked.clear()
+
+
+def block() -> None:
+    """Let neither signal come before `unblock`, in this process and those that it forks."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+
+
+def unblock() -> None:
+    """Let both signals come again."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
 
 
 @contextmanager

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from master import figures
+from master.folders import SCRATCH
 from master.guarded import Death
 from master.recorder import Table
 from master.report import write_summary
@@ -20,15 +23,14 @@ def place_holder(scene: str, process: int, kinds: dict[str, str]) -> dict[str, A
 
 
 def scratch_prefix(process: int) -> str:
-    """Beginning of the name of the folder in which a process makes its results, in or beside that of the results."""
-    return f".pipelay-{process}-"
+    """Beginning of the name of the folder in which a process makes its results, in that of the results."""
+    return f"{SCRATCH}{process}-"
 
 
-def bury(folder: Path, death: Death) -> str:
-    """Finish the results that a dead process left in `folder`; when it died and where they are, empty if it left none."""
-    for place in (folder, folder.parent):
-        for left in place.glob(scratch_prefix(death.process) + "*"):
-            shutil.rmtree(left, ignore_errors=True)
+def bury(folder: Path, death: Death, status: str = "died") -> str:
+    """Finish the results that a process left in `folder` before its end; when it ended and where they are, empty if it left none."""
+    for left in folder.glob(scratch_prefix(death.process) + "*"):
+        shutil.rmtree(left, ignore_errors=True)
     try:
         found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         table = Table.read(folder / "signals.csv")
@@ -39,12 +41,16 @@ def bury(folder: Path, death: Death) -> str:
     kinds = found.pop("energy_columns")
     time = float(table.column("time")[-1])
     found |= {
+        "status": status,
         "message": f"the process {death.how} at t = {time:g} s",
         "duration_s": time,
         "exchanged_energy_J": float(table.column("exchanged")[-1]),
         "interface_residual_J": float(table.column("interface_residual_sum")[-1]),
         "ledger_closure_J": float(abs(table.column("closure")).max()),
     }
-    figures.draw_all(folder, table, None, (), kinds)
-    write_summary(folder / "summary.json", found)
+    signals = folder / "signals.csv"
+    with suppress(OSError):  # of a full disk
+        os.truncate(signals, signals.read_bytes().rfind(b"\n") + 1)  # within whose last line it may have ended
+        write_summary(folder / "summary.json", found)
+        figures.draw_all(folder, table, None, (), kinds)
     return f" at t = {time:g} s; results so far in {folder}"

@@ -13,8 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from master.errors import RunError, UsageError
+from master.errors import RunError, UsageError, broken_arithmetic
 from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
+from master.fmi.runtime import end_with_reader
 from master.fmi.schema import to_mapping
 from master.fmi.stand_in import let_stand_in
 from master.scene import from_mapping
@@ -32,11 +33,15 @@ _BOND = {  # unit of measure -> the vessel's ports of what pipe and vessel excha
 def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False) -> dict[str, Any]:
     """FMU files of a scene, which start in its equilibrium. Raises UsageError, RunError."""
     scene = from_mapping(mapping, "scene")
-    folders = let_stand_in(PACKAGES)
+    folders, compile_kernels = let_stand_in(PACKAGES)
     from master import statics  # of the packages that now stand in
     from pipe_fmu.slave import PipeUnit
 
-    at = statics.released(scene, statics.equilibrium(scene))
+    with broken_arithmetic("parameters"):
+        statics.parameters(scene)  # refused before the kernels take their minute
+    compile_kernels()
+    with broken_arithmetic("statics"):
+        at = statics.released(scene, statics.equilibrium(scene))
     simulation = scene.sections.simulation
     experiment = {"start_time": 0.0, "stop_time": simulation.duration, "step_size": simulation.macro_step}
     pull = (0.0 - at.found.top).tolist()  # no -0.0 among them
@@ -66,11 +71,14 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
 
 def main(arguments: list[str]) -> None:
     """Entry point."""
+    end_with_reader(sys.stdout.fileno())
     folder = Path(arguments[1]) if arguments[:1] == ["--export"] else None
     try:
         answer = prepare(json.load(sys.stdin), folder, "--portable" in arguments[2:])
     except (UsageError, RunError) as error:
         answer = {"error": str(error), "exit": 2 if isinstance(error, UsageError) else 1}
+    except OSError as error:  # a full disk
+        answer = {"error": f"the scene cannot be prepared: {error}", "exit": 1}
     try:
         json.dump(answer, sys.stdout)
         sys.stdout.flush()

@@ -6,7 +6,10 @@ file and port names only.
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -16,7 +19,7 @@ from master.errors import RunError, UsageError
 from master.interrupts import postponed
 from master.scene import Scene, simulated
 
-COMMAND = (sys.executable, "-m", "master.prepare")
+COMMAND = (sys.executable, "-P", "-m", "master.prepare")  # not with modules of the working folder
 
 
 def prepare(scene: Scene, arguments: Sequence[str] = ()) -> dict[str, Path]:
@@ -36,7 +39,8 @@ def prepare(scene: Scene, arguments: Sequence[str] = ()) -> dict[str, Path]:
                 raise KeyboardInterrupt
             output, _ = child.communicate(request)
         except BaseException:
-            child.kill()
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(child.pid, signal.SIGKILL)  # it leads those that it has started
             child.wait()
             raise
     try:

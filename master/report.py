@@ -47,8 +47,13 @@ def summarise(run: Mapping[str, Any], signals: Table) -> dict[str, Any]:
 
 
 def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
-    """Write as JSON, one key a line."""
-    path.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    """Write as JSON, one key a line; whole, or the file stays as it was. Raises OSError."""
+    unfinished = path.with_name(f".{path.name}")
+    try:
+        unfinished.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
 def screen(summary: Mapping[str, Any], title: str) -> str:

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import os
 import tempfile
-import threading
 import time as clock
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -22,17 +21,18 @@ from tqdm import tqdm
 from master import figures, post_mortem, report
 from master.bonded import open_bonded, signals
 from master.drive import Drive, open_drive
-from master.errors import RunError, UsageError
-from master.folders import gone_if_empty
+from master.errors import RunError
+from master.folders import taken, unwritable
+from master.guarded import Death
 from master.interrupts import postponed
 from master.ledger import EnergyCheckFailed
 from master.prepared import prepare
 from master.recorder import SIGNALS, Recorder, Signal
 from master.scene import Scene
+from master.screen import patience
 from master.units import General
 
 OWN_FILES = ("signals.csv", "shapes.npz", "summary.json", "energy.png", "fig[3-9]_*.png")
-SLOW = 8.0  # s without a sign of life before a word about compiling
 
 
 @dataclass(frozen=True)
@@ -57,34 +57,51 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
 
     Raises UsageError where the scene or the folder cannot be used, RunError where the run could not even start.
     """
-    with gone_if_empty(folder), _scratch_folder(folder) as scratch:
-        with ExitStack() as stack:
-            begun = clock.perf_counter()
-            patience = _patience(screen)
-            stack.callback(patience.cancel)
+    with taken(folder):
+        try:
+            unfinished = tempfile.TemporaryDirectory(prefix=post_mortem.scratch_prefix(os.getpid()), dir=folder)
+        except OSError as error:
+            raise unwritable(folder, error) from None
+        with unfinished as scratch:
+            try:
+                return _simulated(scene, folder, Path(scratch), screen)
+            except OSError as error:  # a full disk, or a folder that is gone
+                how = f"could not write {error.filename or 'its results'} ({error.strerror or error})"
+                left = post_mortem.bury(folder, Death(how, os.getpid()), "failed")
+                raise RunError(f"the process {how}{left}") from None
+
+
+def _simulated(scene: Scene, folder: Path, scratch: Path, screen: TextIO) -> Result:
+    """Run a scene; the files that are made at its end are made in `scratch`. Raises as `simulate`, and OSError."""
+    with ExitStack() as stack:
+        begun = clock.perf_counter()
+        calm = stack.enter_context(patience(screen))
+        try:
             simulation, drive, kept = scene.sections.simulation, *_open(scene, stack)
-            _clear(folder)
-            report.write_summary(folder / "summary.json", post_mortem.place_holder(scene.name, os.getpid(), drive.ledger.kinds))
-            stream = stack.enter_context((folder / "signals.csv").open("w", encoding="utf-8"))
-            recorder = Recorder(drive.units, simulation.recording_step, simulation.snapshots, kept, stream)
-            started = clock.perf_counter()
-            ending = _march(drive, recorder, scene, screen, patience)
-            wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
-            if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
-                recorder.record_shape(drive.time)
-            account: dict[str, Any] = {"coupling": drive.scheme, "start_remarks": drive.remarks.start}
-            account |= {"steps_with_remarks": drive.remarks.count, "first_remarks": drive.remarks.first}
-            account |= {**_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
-            account |= drive.ledger.summary()
-            account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}
-            account |= {"energy_check": ending.message if ending.status == "stopped" else drive.ledger.verdict()}
-            result = _write(scene, recorder, account, scratch, drive.ledger.kinds)
-        _move_into_place(scratch, folder)
+        except OSError as error:
+            raise RunError(f"the units cannot be opened: {error}") from None
+        _clear(folder)
+        report.write_summary(folder / "summary.json", post_mortem.place_holder(scene.name, os.getpid(), drive.ledger.kinds))
+        stream = stack.enter_context((folder / "signals.csv").open("w", encoding="utf-8"))
+        recorder = Recorder(drive.units, simulation.recording_step, simulation.snapshots, kept, stream)
+        started = clock.perf_counter()
+        ending = _march(drive, recorder, scene, screen, calm)
+        wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
+        if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
+            recorder.record_shape(drive.time)
+        account: dict[str, Any] = {"coupling": drive.scheme, "start_remarks": drive.remarks.start}
+        account |= {"steps_with_remarks": drive.remarks.count, "first_remarks": drive.remarks.first}
+        account |= {**_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
+        account |= drive.ledger.summary()
+        account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}
+        account |= {"energy_check": ending.message if ending.status == "stopped" else drive.ledger.verdict()}
+        result = _write(scene, recorder, account, scratch, drive.ledger.kinds)
+    _move_into_place(scratch, folder)
     return result
 
 
-def _march(drive: Drive, recorder: Recorder, scene: Scene, stream: TextIO, patience: threading.Timer) -> Ending:
-    """Step to the end, recording after every step; the first one may compile and ends the need for `patience`."""
+def _march(drive: Drive, recorder: Recorder, scene: Scene, stream: TextIO, calm: Callable[[], None]) -> Ending:
+    """Step to the end, recording after every step; the first one may compile, after it `calm` is called."""
     end = scene.sections.simulation.duration
     recorder.sample(drive.time, row(drive))
     with postponed() as interrupted, _progress(end, stream) as bar:
@@ -96,7 +113,7 @@ def _march(drive: Drive, recorder: Recorder, scene: Scene, stream: TextIO, patie
                 return Ending("stopped", str(error))
             except RunError as error:
                 return Ending("failed", str(error))
-            patience.cancel()
+            calm()
             recorder.sample(drive.time, row(drive))
             bar.update(drive.time - before)
             if interrupted.is_set():
@@ -137,8 +154,7 @@ def _write(scene: Scene, recorder: Recorder, account: dict[str, Any], folder: Pa
 
 
 def _clear(folder: Path) -> None:
-    """Make the folder, or remove the results of an earlier run from it; other files there stay."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Remove the results of an earlier run from the folder; other files there stay."""
     for pattern in OWN_FILES:
         for old in folder.glob(pattern):
             old.unlink()
@@ -150,30 +166,7 @@ def _move_into_place(scratch: Path, folder: Path) -> None:
         new.replace(folder / new.name)
 
 
-@contextmanager
-def _scratch_folder(folder: Path) -> Iterator[Path]:
-    """A folder in `folder`, or beside it, for files in the making. Raises UsageError where none can be made."""
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        prefix = post_mortem.scratch_prefix(os.getpid())
-        scratch = tempfile.TemporaryDirectory(prefix=prefix, dir=folder if folder.is_dir() else folder.parent)
-    except OSError as error:
-        raise UsageError(f"--output = {str(folder)!r}: cannot be written ({error.strerror})") from None
-    with scratch as name:
-        yield Path(name)
-
-
 def _progress(end: float, stream: TextIO) -> Any:
     """A bar over simulated time; nothing where `stream` is no terminal."""
     style = "{percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} s simulated, {remaining} left"
     return tqdm(total=end, file=stream, disable=not stream.isatty(), bar_format=style, leave=False)
-
-
-def _patience(stream: TextIO) -> threading.Timer:
-    """A timer that says why it takes long, if it does and somebody sits at the terminal; to be cancelled."""
-    words = "a first run compiles the numerical kernels, which takes about a minute; later runs find them again"
-    timer = threading.Timer(SLOW, tqdm.write, [words, stream])
-    timer.daemon = True
-    if stream.isatty():
-        timer.start()
-    return timer

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -36,6 +37,8 @@ FOUND = {
     "vessel.departure_rotation": "is found by the statics",
 }
 """Parameters of the units that a scene may not give, and where they come from."""
+DEEPEST = 20  # tables and lists within one another
+LEAST, LARGEST = 1e-30, 1e30  # amount of a number of pipe and vessel, beyond any in SI units: the products of a few are finite
 
 
 class SceneError(UsageError):
@@ -121,6 +124,9 @@ def from_mapping(mapping: dict[str, Any], name: str, folder: Path = Path()) -> S
         table, _, leaf = key.partition(".")
         if leaf in mapping.get(table, {}):
             raise SceneError(f"{key}: {origin}; must be absent")
+    for key, value in _leaves(mapping):
+        if isinstance(value, float) and math.isfinite(value) and value and not LEAST <= abs(value) <= LARGEST:
+            raise SceneError(f"{key} = {value:g}: must be 0, or in amount from {LEAST:g} to {LARGEST:g}")
     try:
         return Scene(name, build(Sections, mapping), mapping)
     except ValueError as error:
@@ -129,9 +135,9 @@ def from_mapping(mapping: dict[str, Any], name: str, folder: Path = Path()) -> S
 
 def _read(name: str, path: Path) -> bytes:
     if path.name == name and not path.suffix:
-        if (found := BUILT_IN / f"{name}.toml").is_file():
-            return found.read_bytes()
         names = list(built_in())
+        if name in names:
+            return (BUILT_IN / f"{name}.toml").read_bytes()
         near = difflib.get_close_matches(name, names, 1, 0.5)
         hint = f" (did you mean {near[0]}?)" if near else ""
         raise SceneError(
@@ -143,17 +149,44 @@ def _read(name: str, path: Path) -> bytes:
         return path.read_bytes()
     except FileNotFoundError:
         raise SceneError(f"scene = {name!r}: no such file") from None
-    except OSError as error:
-        raise SceneError(f"scene = {name!r}: cannot be read ({error.strerror})") from None
+    except (OSError, ValueError) as error:  # the latter for a null character
+        raise SceneError(f"scene = {name!r}: cannot be read ({getattr(error, 'strerror', error)})") from None
 
 
 def _parse(name: str, content: bytes) -> dict[str, Any]:
     try:
-        return tomllib.loads(content.decode("utf-8"))
+        return _sound(tomllib.loads(content.decode("utf-8")))
     except UnicodeDecodeError as error:
         raise SceneError(f"scene = {name!r}: must be UTF-8 text ({error.reason} at byte {error.start})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"scene = {name!r}: not TOML: {error}") from None
+    except SceneError:
+        raise
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, thousands of brackets
+        raise SceneError(f"scene = {name!r}: not TOML: {str(error).partition(';')[0]}") from None
+
+
+def _sound(mapping: dict[str, Any]) -> dict[str, Any]:
+    """`mapping`, if every value in it can be looked at, printed and handed on. Raises SceneError."""
+    for path, value in _leaves(mapping):
+        if isinstance(value, int) and value.bit_length() > 64:
+            raise SceneError(f"{path} has {value.bit_length()} bits: must be finite, an integer within 64 bits")
+    return mapping
+
+
+def _leaves(mapping: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Every value that is no table and no list, with its place. Raises SceneError where tables and lists lie too deep."""
+    level = list(mapping.items())
+    for _ in range(DEEPEST):
+        inner: list[tuple[str, Any]] = []
+        for path, value in level:
+            if isinstance(value, dict):
+                inner += [(f"{path}.{key}", item) for key, item in value.items()]
+            elif isinstance(value, list):
+                inner += [(f"{path}[{i}]", item) for i, item in enumerate(value, 1)]
+            else:
+                yield path, value
+        level = inner
+    if level:
+        raise SceneError(f"{level[0][0][:60]}...: must not nest more than {DEEPEST} tables and lists")
 
 
 def _parse_change(change: str) -> dict[str, Any]:
@@ -161,12 +194,15 @@ def _parse_change(change: str) -> dict[str, Any]:
     if not (key and equals and value):
         raise SceneError(f"--set {change}: must be key=value, as in simulation.duration=60")
     try:
-        return tomllib.loads(f"{key} = {value}")
-    except tomllib.TOMLDecodeError:
+        return _sound(tomllib.loads(f"{key} = {value}"))
+    except SceneError:
+        raise
+    except (ValueError, RecursionError):
         rule = (
             'the value must be a number, true, false, [a, list] or a "text" in quotes (quote the whole for the shell)'
         )
-        raise SceneError(f"--set {change}: {rule}") from None
+        shown = change if len(change) <= 80 else change[:77] + "..."
+        raise SceneError(f"--set {shown}: {rule}") from None
 
 
 def _merge(mapping: dict[str, Any], change: Mapping[str, Any], source: str, path: str = "") -> None:

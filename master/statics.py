@@ -44,17 +44,24 @@ class Prepared:
 def equilibrium(scene: Scene) -> Prepared:
     """Equilibrium of a scene, without its release. Raises UsageError for parameters the units refuse, RunError where none is found."""
     start = scene.sections.start
-    environment = scene.mapping["environment"]
-    depth = _checked(Environment, environment, "environment").depth
-    pipe = _pipe(scene, (start.x, start.y, -depth if start.z is None else start.z))
+    pipe, vessel = parameters(scene)
     held = None if start.departure is None else Rotation.from_euler("ZY", [start.yaw, start.departure])
-    if scene.sections.vessel is None:
+    if vessel is None:
         pipe = _resolved(pipe, np.array(pipe.top_position), held)
         found = _hang(Pipe(pipe), np.array(pipe.top_position), held)
         return Prepared(_placed(pipe, found), None, found)
-    vessel = _checked(VesselParameters, scene.mapping["vessel"] | {"environment": environment}, "vessel")
-    even_keel = np.array([start.x, start.y, vessel.hang_off[2] - depth])
+    even_keel = np.array([start.x, start.y, vessel.hang_off[2] - vessel.environment.depth])
     return _floating(scene, _resolved(pipe, even_keel, held), vessel)
+
+
+def parameters(scene: Scene) -> tuple[PipeParameters, VesselParameters | None]:
+    """Parameters of the units before anything is computed. Raises UsageError for what the units refuse."""
+    start, environment = scene.sections.start, scene.mapping["environment"]
+    depth = _checked(Environment, environment, "environment").depth
+    pipe = _pipe(scene, (start.x, start.y, -depth if start.z is None else start.z))
+    if scene.sections.vessel is None:
+        return pipe, None
+    return pipe, _checked(VesselParameters, scene.mapping["vessel"] | {"environment": environment}, "vessel")
 
 
 def released(scene: Scene, at: Prepared) -> Prepared:

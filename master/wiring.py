@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -149,7 +150,7 @@ def loaded(scene: General) -> Iterator[Wiring]:
         fmus: dict[str, Fmu] = {}
         for name, unit in scene.units.items():
             path = scene.folder / unit.fmu
-            if not path.is_file():
+            if not os.path.isfile(path):  # nor one of a name that cannot be
                 raise UsageError(f"units.{name}.fmu = {unit.fmu!r}: no such file in {scene.folder.resolve()}")
             try:
                 fmus[name] = stack.enter_context(Fmu(path, name))

@@ -5,12 +5,14 @@ import subprocess
 import sys
 import tempfile
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from time import sleep
 
 import pytest
 from units.toys import SPRING, spring_recipe
 
-from master.fmi import entry, loader
+from master.fmi import build, entry, loader
 from master.fmi.build import build_fmu, cache_folder, cached_fmu
 
 PROGRAM = """
@@ -150,3 +152,31 @@ def test_two_spellings_of_the_interpreter_are_one(tmp_path):
     prefix = "import sys; print(sys.prefix, sys.base_prefix)"
     own, other = (subprocess.run([it, "-c", prefix], capture_output=True, text=True).stdout for it in (sys.executable, found[0].split()[0]))
     assert own == other  # the same virtual environment
+
+
+def test_kernels_are_compiled_once_for_all_who_ask_at_once_and_again_where_some_are_missing_or_of_another_processor(tmp_path, monkeypatch):
+    monkeypatch.setenv("PIPELAY_CACHE", str(tmp_path))
+    kernel = cache_folder("units") / SPRING.bundle / "__pycache__" / "kernel.nbi"
+    called = []
+
+    def compiled(*_):
+        called.append(1)
+        kernel.parent.mkdir(parents=True, exist_ok=True)
+        kernel.write_bytes(b".")  # the first of many: the others take time
+        sleep(0.2)
+
+    monkeypatch.setattr(build, "_kernels", compiled)
+    fmu = cached_fmu(SPRING, tmp_path)
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(lambda _: build.compile_kernels(SPRING, fmu), range(4)))
+    assert len(called) == 1
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    build.compile_kernels(SPRING, fmu)
+    assert len(called) == 2
+    kernel.write_bytes(b"")  # cut short
+    entry._mend(kernel.parents[1], tmp_path / "nothing")
+    kernel.write_bytes(b".")  # as another process begins anew
+    build.compile_kernels(SPRING, fmu)
+    assert len(called) == 3
+    build.compile_kernels(SPRING, fmu)
+    assert len(called) == 3

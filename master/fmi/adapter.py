@@ -7,7 +7,7 @@ of its ports and their nominal() values by unit of measure. Answers to the host 
   - a step that does not converge, meets an input that is not finite, or is asked for out of order: logged, discard,
     the unit stands where it stood before;
   - a step of no length or beyond a defined stop time, a refused parameter or initialisation, and a bug: fmi2Error with the
-    message (fmi2Fatal under PythonFMU's own library), the unit stands where it stood, the process lives on.
+    message, the unit stands where it stood, the process lives on.
 Statics and everything else that initialisation costs is done when the first output is asked for, or at the end of
 initialisation mode.
 """

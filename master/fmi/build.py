@@ -26,10 +26,14 @@ from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
 
+import numba
+from llvmlite import binding
 from pythonfmu import FmuBuilder
 
 from ..errors import RunError
-from . import entry, licenses, loader, portable
+from ..locks import locked
+from . import cache, entry, licenses, loader, portable
+from .cache import cache_folder
 from .document import icon_png, page_html
 from .portable import EPOCH
 
@@ -104,29 +108,30 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
     return destination
 
 
-def cache_folder(kind: str) -> Path:
-    """Where files of a kind are kept by content, as `entry` has it for FMUs. Raises RunError."""
-    folder = next(entry.cache_folders(kind), None)
-    if folder is None:
-        raise RunError("no folder can be written for the FMUs; set PIPELAY_CACHE to one that can")
-    return folder
-
-
 def cached_fmu(recipe: Recipe, folder: Path) -> Path:
     """The FMU of this recipe in `folder`, built if it is not there: ``folder/Pipe_<hash>.fmu``."""
     path = folder / f"{recipe.name}_{recipe.digest}.fmu"
-    return path if zipfile.is_zipfile(path) else build_fmu(recipe, path)
+    if not (cache.used(path) and zipfile.is_zipfile(path)):
+        build_fmu(recipe, path)
+        cache.bound()
+    return path
 
 
 def compile_kernels(recipe: Recipe, fmu: Path) -> None:
-    """Have numba compile the kernels of this recipe's `fmu`, unless some were compiled before, so that a process that runs it loads them.
+    """Have numba compile the kernels of this recipe's `fmu`, unless all of them are, so that a process that runs it loads them.
 
     A process that compiles kernels binds them otherwise than one that loads them, with other round-off: the first run would
-    differ from the later ones in the last bits. Raises RunError if the FMU does not start.
+    differ from the later ones in the last bits. Where two processes ask at once, one waits for the other. Raises RunError if the
+    FMU does not start.
     """
-    if not any((cache_folder("units") / recipe.bundle).rglob("*.nbi")):
-        with zipfile.ZipFile(fmu) as archive:
-            _kernels(recipe, {name: archive.read(name) for name in archive.namelist() if name.startswith("resources/")})
+    unit = cache_folder("units") / recipe.bundle
+    mark = unit / entry.COMPILED.format(_compiler())
+    with locked(fmu):
+        if not (mark.is_file() and any(unit.rglob("*.nbi"))):
+            with zipfile.ZipFile(fmu) as archive:
+                _kernels(recipe, {name: archive.read(name) for name in archive.namelist() if name.startswith("resources/")})
+            with contextlib.suppress(OSError):  # settled elsewhere
+                mark.touch()
 
 
 def bundled_package(fmu: Path) -> ModuleType:
@@ -140,6 +145,13 @@ def bundled_package(fmu: Path) -> ModuleType:
         sys.path.insert(0, str(resources))
         slave = importlib.import_module((resources / "slavemodule.txt").read_text())
         return sys.modules[slave.PACKAGE]
+
+
+def _compiler() -> str:
+    """Hash of what makes numba compile anew, beside the sources: its version and that of Python, the processor, its settings."""
+    host = (binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
+    settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_"))
+    return hashlib.sha256(repr((sys.version, numba.__version__, host, settings)).encode()).hexdigest()[:12]
 
 
 def _about(recipe: Recipe) -> dict[str, str]:

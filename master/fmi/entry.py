@@ -8,7 +8,6 @@ the same rule: it imports this module for it.
 """
 
 import contextlib
-import ctypes
 import importlib
 import importlib.util
 import os
@@ -22,10 +21,7 @@ from types import ModuleType
 
 PACKAGE = __name__.removesuffix("_entry")
 IN_FMU = __name__.endswith("_entry")
-
-# PythonFMU runs this text at import and once more for every instance, and each time releases this module's globals once
-# too often; without a reference for each of these runs they would vanish under the living classes.
-ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+COMPILED = "compiled_{}"  # empty file in a settled package whose kernels are all there, by what they were compiled with
 
 
 def cache_folders(kind: str) -> Iterator[Path]:
@@ -73,6 +69,7 @@ def settle(bundled: Path) -> Path:
                     with contextlib.suppress(OSError):  # another process was faster
                         copy.rename(place)
             _mend(place, bundled)
+            os.utime(place)  # used just now
         except OSError:
             continue
         return place
@@ -92,6 +89,8 @@ def _mend(place: Path, bundled: Path) -> None:
         with contextlib.suppress(FileNotFoundError):  # another process has dropped it
             if not _is_pickled(kernel):
                 kernel.unlink()
+                for mark in place.glob(COMPILED.format("*")):
+                    mark.unlink(missing_ok=True)
     for source in (path for path in bundled.rglob("*") if path.is_file()):
         target = place / source.relative_to(bundled)
         if target.is_file() and (source.parent.name == "__pycache__" or target.read_bytes() == source.read_bytes()):
@@ -139,6 +138,6 @@ if IN_FMU:
     _unit = load()
 
     class Slave(_unit.UnitSlave):  # type: ignore[name-defined]
-        """The slave that PythonFMU instantiates."""
+        """The slave that the loader's server instantiates."""
 
         unit_class = _unit.Unit

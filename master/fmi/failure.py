@@ -1,33 +1,29 @@
-"""How a failure inside an FMU reaches the host, and the process survives it, and its own end.
-
-PythonFMU knows three answers: OK, fmi2Discard (``do_step`` returns False) and, for a Python exception, fmi2Fatal. For
-every exception it also releases the class, the instance and the log list once too often, so that the second one kills
-the process. `Refused` is therefore raised through `refusal`, which takes those references beforehand; PythonFMU logs
-its repr. FMI messages are printf formats, so '%' is doubled.
-"""
+"""How a failure inside an FMU reaches the host: as a line of its log, see `server`. These are printf formats, so '%' is doubled."""
 
 from __future__ import annotations
 
-import ctypes
 import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-released_by_host = True  # PythonFMU does; the loader and `server` do not
 LONGEST = 1000  # characters; hosts format messages in buffers of fixed size
 
 
 class Refused(Exception):  # noqa: N818  (no error of the program: a message to the host)
     """Carries one line to the host."""
 
-    def __repr__(self) -> str:
-        return printable(str(self))
+
+def visible(text: str, kept: str = "") -> str:
+    """The text with everything escaped that a screen would obey, turn round or not show, but for the characters `kept`."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text)
 
 
 def printable(message: str) -> str:
     """One line, fit for a printf format."""
-    return " ".join(message.split())[:LONGEST].replace("%", "%%")
+    return visible(" ".join(message.split()))[:LONGEST].replace("%", "%%")
 
 
 def where(error: BaseException) -> str:
@@ -39,25 +35,18 @@ def where(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}{place}"
 
 
-def refusal(slave: Any, message: str) -> Refused:
-    """The exception to raise out of a method of `slave` that PythonFMU calls."""
-    for released in (type(slave), slave, slave.log_queue) if released_by_host else ():
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(released))
-    return Refused(message)
-
-
 def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator for the methods that PythonFMU calls: nothing leaves them but a harmless `Refused`."""
+    """Decorator for the methods that `server` calls: nothing leaves them but a harmless `Refused`."""
 
     @functools.wraps(method)
     def call(slave: Any, *arguments: Any) -> Any:
         try:
             return method(slave, *arguments)
         except (Refused, ValueError) as error:
-            raise refusal(slave, str(error)) from None
+            raise Refused(str(error)) from None
         except KeyboardInterrupt:
-            raise refusal(slave, "interrupted") from None
+            raise Refused("interrupted") from None
         except Exception as error:  # a bug: say where it is, and let the host stop
-            raise refusal(slave, where(error)) from None
+            raise Refused(where(error)) from None
 
     return call

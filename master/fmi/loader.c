@@ -217,16 +217,25 @@ static int start_in_host(const char *resources) {
     char path[LONGEST_PATH];
     PATH_IN(path, resources, "runtime.py");
     int state = py.ensure();
-    void *numpy = py.import("numpy"), *numba = numpy ? py.import("numba") : NULL, *runpy = numba ? py.import("runpy") : NULL;
-    void *globals = runpy ? py.method(runpy, "run_path", "s", path) : NULL, *load = globals ? py.item(globals, "load") : NULL;
+    static const char run[] = "with open(path, 'rb') as file:\n    exec(compile(file.read(), path, 'exec'))"; /* imports nothing */
+    void *builtins = py.import("builtins"), *globals = builtins ? py.method(builtins, "dict", NULL) : NULL;
+    void *given = globals ? py.method(globals, "__setitem__", "ss", "path", path) : NULL;
+    void *ran = given ? py.method(builtins, "exec", "sO", run, globals) : NULL, *load = ran ? py.item(globals, "load_in_host") : NULL;
     void *folder = load ? py.text(resources) : NULL, *handle = folder ? py.call(load, folder, NULL) : NULL;
     if (handle && py.callable(handle)) py.handle = handle;
-    void *held[] = {numpy, numba, runpy, globals, folder, py.handle ? NULL : handle};
+    void *held[] = {builtins, globals, given, ran, folder, py.handle ? NULL : handle};
     for (size_t i = 0; i < sizeof held / sizeof *held; i++)
         if (held[i]) py.forget(held[i]);
     py.clear();
     py.release(state);
     return py.handle != NULL;
+}
+
+/* `fd`, moved away from the standard streams where the host has closed those. */
+static int above_streams(int fd) {
+    int moved = fd > 2 ? fd : fcntl(fd, F_DUPFD_CLOEXEC, 3);
+    if (moved != fd) close(fd);
+    return moved;
 }
 
 static int start_process(Instance *it, const char *python, const char *resources, const char *libraries, const char *advice) {
@@ -235,10 +244,13 @@ static int start_process(Instance *it, const char *python, const char *resources
     PATH_IN(path, resources, "runtime.py");
     if (access(python, X_OK)) return complain(it, "Python %s: %s%s", python, strerror(errno), advice);
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends)) return complain(it, "no socket: %s", strerror(errno));
+    ends[0] = above_streams(ends[0]), ends[1] = above_streams(ends[1]);
     pid_t pid = fork();
     if (!pid) { /* a session of its own: Ctrl-C is for the host */
         setsid();
         if (libraries) setenv("LD_LIBRARY_PATH", libraries, 1);
+        while ((code = open("/dev/null", O_RDWR)) >= 0 && code < 3) {} /* streams that the host has closed */
+        if (code > 2) close(code);
         dup2(2, 1);
         if (ends[1] == 3 ? !fcntl(3, F_SETFD, 0) : dup2(ends[1], 3) == 3) execl(python, python, "-I", "-B", path, "3", (char *)NULL);
         _exit(127);

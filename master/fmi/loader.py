@@ -21,7 +21,7 @@ FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-shared", "-s")
 def compiler() -> list[str]:
     """ziglang's compiler (for glibc 2.17, so for every Linux in use), else the machine's own. Raises RunError without either."""
     if importlib.util.find_spec("ziglang"):
-        return [interpreter(), "-m", "ziglang", "cc", "-target", "x86_64-linux-gnu.2.17"]
+        return [interpreter(), "-P", "-m", "ziglang", "cc", "-target", "x86_64-linux-gnu.2.17"]
     if found := shutil.which("cc"):
         return [found]
     raise RunError("no C compiler for the FMU's loader: pip install ziglang")

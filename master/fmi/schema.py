@@ -196,7 +196,7 @@ def _any_length(hint: Any) -> bool:
 def _loads(text: Any, where: str) -> Any:
     try:
         return json.loads(text)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, RecursionError) as error:
         raise _fault(where, text, f"must be JSON: {error}") from None
 
 

@@ -10,7 +10,6 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from . import failure
 from .failure import Refused, printable, where
 
 OK, DISCARD, ERROR = 0, 2, 3
@@ -18,8 +17,6 @@ HEAD, REPLY = struct.Struct("ii"), struct.Struct("II")
 FORMATS = "dii"  # of real, integer, boolean
 GETTERS = ("get_real", "get_integer", "get_boolean", "get_string")
 SETTERS = ("set_real", "set_integer", "set_boolean", "set_string")
-
-failure.released_by_host = False
 
 
 class _Slot:

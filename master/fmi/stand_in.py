@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
@@ -44,11 +44,12 @@ class _Alias(MetaPathFinder, Loader):
         module.__spec__ = self._specs.pop(module.__spec__.name)
 
 
-def let_stand_in(units: Mapping[str, tuple[str, Mapping[str, Any]]]) -> dict[str, Path]:
+def let_stand_in(units: Mapping[str, tuple[str, Mapping[str, Any]]]) -> tuple[dict[str, Path], Callable[[], None]]:
     """For `units`, none of them imported yet: package -> place of the unit's class in it (``slave.PipeUnit``) and parameters with which an
-    FMU is built without running a kernel; any kernel is compiled by a process of its own. Returns the packages' own folders.
+    FMU is built without running a kernel.
 
-    Raises RunError.
+    Returns the packages' own folders, and a function to be called before any kernel is run, which has those that are not compiled
+    compiled by processes of their own. Both raise RunError.
     """
     folders = {}
     for package in units:
@@ -58,8 +59,11 @@ def let_stand_in(units: Mapping[str, tuple[str, Mapping[str, Any]]]) -> dict[str
         folders[package] = Path(spec.origin).parent
     recipes = [Recipe(folders[package], unit, parameters) for package, (unit, parameters) in units.items()]
     fmus = [cached_fmu(recipe, cache_folder("fmus")) for recipe in recipes]
-    with ThreadPoolExecutor() as pool:
-        list(pool.map(compile_kernels, recipes, fmus))
     names = {package: bundled_package(fmu).__name__ for package, fmu in zip(units, fmus, strict=True)}
     sys.meta_path.insert(0, _Alias(names))
-    return folders
+
+    def compile_all() -> None:
+        with ThreadPoolExecutor() as pool:
+            list(pool.map(compile_kernels, recipes, fmus))
+
+    return folders, compile_all
