@@ -88,7 +88,9 @@ def parser() -> argparse.ArgumentParser:
         "scenes", "List the built-in scenes.", "Copy one of their files for a scene of your own; `pipelay keys` lists what it may say."
     )
     command(
-        "keys", "List what a scene of pipe and vessel may say: keys, defaults, units.", "Lists of tables have [] behind their names."
+        "keys",
+        "List what a scene of pipe and vessel may say: keys, defaults, units.",
+        "Lists of tables have [] behind their names; defaults in brackets act only where their table stands in the scene.",
     )
     stability = command(
         "stability",

@@ -9,13 +9,14 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from master import physics, scene_remarks
 from master import scene as scenes_of
 from master.errors import RunError, UsageError, broken_arithmetic
 from master.fmi.system import EXPORTED, write_system
 from master.folders import SCRATCH, taken, unwritable
 from master.interrupts import postponed
 from master.prepared import prepare
-from master.screen import patience, say, terminal
+from master.screen import complain, patience, say, terminal
 
 
 def run(options: argparse.Namespace) -> int:
@@ -41,6 +42,7 @@ def statics(options: argparse.Namespace) -> int:
 
     with patience(terminal()), broken_arithmetic("statics"):
         found = report(scene)
+        found["remarks"] = [*scene_remarks.of(scene, at_rest=True).get("scene", []), *found["remarks"]]
         text = json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found)
     say(text, result=True)
     return 0
@@ -62,6 +64,8 @@ def export(options: argparse.Namespace) -> int:
             written = _moved([*fmus.values(), *joined], folder)
     for path in written:
         say(str(path))
+    for words in scene_remarks.of(scene).get("scene", []):
+        complain(f"remark: {words}", 0)
     return 0
 
 
@@ -143,11 +147,13 @@ def _statics_table(scene: scenes_of.Scene, found: dict[str, Any]) -> str:
     def kilo(key: str) -> str:
         return "  ".join(f"{value / 1e3:10.3f}" for value in found[key])
 
-    touchdown = found["touchdown_s_m"]
+    touchdown, used = found["touchdown_s_m"], found["utilisation"]
+    stress = f"{found['largest_von_mises_Pa'] / 1e6:.1f} MPa" + ("" if used is None else f", utilisation {used:.3f}")
     note = "" if found["stable"] else "; not stable: the line will leave it at the least push"
     return "\n".join(
         (
             f"Equilibrium of {scene.name}{note}: {scene.sections.title}",
+            f"  physics         {physics.acting(scene)}",
             "on the pipe                  x           y           z",
             f"  top force     {kilo('top_force_e_N')}  kN",
             f"  top moment    {kilo('top_moment_e_N_m')}  kN m",
@@ -155,8 +161,10 @@ def _statics_table(scene: scenes_of.Scene, found: dict[str, Any]) -> str:
             f"  foot moment   {kilo('foot_moment_e_N_m')}  kN m",
             f"  top tension     {found['top_tension_N'] / 1e3:.3f} kN",
             f"  largest bending {found['largest_bending_moment_N_m'] / 1e3:.3f} kN m",
+            f"  largest stress  {stress} (von Mises)",
             f"  stretch         {found['stretch_m']:.4f} m",
             f"  lowest point    {found['lowest_point_m']:.3f} m",
             f"  touchdown at    {'no seabed contact' if touchdown is None else f'S = {touchdown:.1f} m'}",
+            *(f"  remark          {words}" for words in found["remarks"]),
         )
     )

@@ -79,8 +79,8 @@ class OnBond:
     def advance(self, end: float) -> None:
         """See `Drive`."""
         step = self._coupling.advance(self.time, end - self.time)
-        self.remarks.note(self.units)
         self.time = snapped(step.time + step.step, self._macro_step, end)
+        self.remarks.note(self.units, self.time)
 
 
 class Coupled(OnBond):
@@ -158,7 +158,7 @@ class Prescribed:
             self._rejected += 1
             step = self._wanted = step / 2
         self.time = snapped(self.time + step, self._macro_step, end)
-        self.remarks.note(self.units)
+        self.remarks.note(self.units, self.time)
         self._wanted = min(2.0 * self._wanted, self._macro_step)
         self._steps += 1
 

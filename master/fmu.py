@@ -101,7 +101,7 @@ class Fmu:
         except Exception as error:  # as above; the FMU's own words are in the log
             folder.cleanup()
             raise FmuFailed(f"{self.name}: cannot be loaded: {self._words(str(error))}") from None
-        self.remark = ""  # the FMU's warning about its start, or about its last step
+        self.remark = ""  # the FMU's warnings about its start, or about its last step, a line each
         self._close = weakref.finalize(self, _free, self._fmu, self._states, folder)  # at exit at the latest
         self._component = ctypes.c_void_p(self._fmu.component)
         self._channels: dict[Names, _Channel] = {}
@@ -126,7 +126,7 @@ class Fmu:
         for name, value in (inputs or {}).items():
             self.set(name, value)
         self._call("initialisation", self._fmu.exitInitializationMode)
-        self.remark = self._words("") if self.messages else ""
+        self.remark = "\n".join(self._spoken()) if self.messages else ""
 
     def close(self) -> None:
         """Free every state, the instance and the unpacked files; safe to call twice."""
@@ -182,7 +182,7 @@ class Fmu:
         status = self._do_step(self._component, ctypes.c_double(time), ctypes.c_double(step), final)
         if status > 1:
             raise self._failure(f"step of {step:.6g} s at {time:.9g} s", STEP_FAILURES.get(status, FmuFailed))
-        self.remark = self._words("") if self.messages else ""
+        self.remark = "\n".join(self._spoken()) if self.messages else ""
 
     def snapshot(self) -> ctypes.c_void_p:
         """A handle to the FMU's whole state, for `restore`; freed by `release` or `close`."""
@@ -256,9 +256,14 @@ class Fmu:
 
     def _words(self, otherwise: str) -> str:
         """The latest warning or complaint in the log; forgets it."""
+        spoken = self._spoken()
+        return spoken[-1] if spoken else otherwise
+
+    def _spoken(self) -> list[str]:
+        """The latest warnings and complaints in the log; forgets them."""
         spoken = [text for status, text in self.messages if status > 0]
         self.messages.clear()
-        return spoken[-1] if spoken else otherwise
+        return spoken
 
 
 def _callbacks(messages: deque[tuple[int, str]]) -> Any:

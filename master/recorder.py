@@ -62,6 +62,7 @@ SIGNALS = (
     _signal("pipe", "largest_tension", "largest_tension", "N"),
     _signal("pipe", "largest_bending_moment", "largest_bending_moment", "N.m"),
     _signal("pipe", "largest_von_mises", "largest_von_mises", "Pa"),
+    _signal("pipe", "largest_utilisation", "largest_utilisation", "1"),
 )
 """Columns of signals.csv between the time and the ledger; top_force, top_moment: the pull of the pipe on the vessel."""
 

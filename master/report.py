@@ -42,6 +42,8 @@ def summarise(run: Mapping[str, Any], signals: Table) -> dict[str, Any]:
             "von_mises_max_Pa": _largest(signals, "largest_von_mises"),
             "pipe_length_m": _last(signals, "pipe_length")[0],
         }
+        if "largest_utilisation" in signals:
+            summary["utilisation_max"] = _largest(signals, "largest_utilisation")
         summary["stretch_m"] = summary["pipe_length_m"] - run["unstretched_length_m"]
     return {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in summary.items()}
 
@@ -74,16 +76,26 @@ def screen(summary: Mapping[str, Any], title: str) -> str:
     if "top_tension_min_N" in summary:
         low, high = summary["top_tension_min_N"] / 1e3, summary["top_tension_max_N"] / 1e3
         bending, stress = summary["bending_moment_max_N_m"] / 1e3, summary["von_mises_max_Pa"] / 1e6
+        used = f", utilisation {summary['utilisation_max']:.3f}" if "utilisation_max" in summary else ""
         rows += [
             ("top tension", f"{low:.2f} to {high:.2f} kN"),
-            ("largest bending", f"{bending:.2f} kN m, von Mises stress {stress:.1f} MPa"),
+            ("largest bending", f"{bending:.2f} kN m, von Mises stress {stress:.1f} MPa{used}"),
             ("pipe length", f"{summary['pipe_length_m']:.4f} m at the end"),
         ]
     left = f"the bond made {summary['interface_residual_J']:.2g} J of {summary['exchanged_energy_J']:.3g} J exchanged"
     rows += [("coupling", f"{summary['coupling']}; {left}"), ("energy check", summary["energy_check"].removeprefix("energy check "))]
-    rows += [(f"{unit} start", words) for unit, words in summary["start_remarks"].items()]
-    for unit, count in summary["steps_with_remarks"].items():
-        of = f"of {count} of {summary['macro_steps']} steps"
-        rows.append((f"{unit} remarks", f"{of}, first: {summary['first_remarks'][unit]}"))
+    if summary["physics"]:
+        rows.insert(0, ("physics", summary["physics"]))
+    rows += [(f"{name} start", words) for name, remarks in summary["start_remarks"].items() for words in remarks]
+    rows += [(f"{unit} remark", _told(remark)) for unit, remarks in summary["remarks"].items() for remark in remarks]
     width = max(len(name) for name, _ in rows)
     return "\n".join([f"{summary['scene']}: {title}", *(f"  {name:{width}}  {text}" for name, text in rows)])
+
+
+def _told(remark: Mapping[str, Any]) -> str:
+    """A remark of one kind: when and what first, how often, when and what last."""
+    first = f"at {remark['first_s']:g} s: {remark['first']}"
+    if remark["times"] == 1:
+        return first
+    last = "the same" if remark["last"] == remark["first"] else remark["last"]
+    return f"{first}; {remark['times']} times, last at {remark['last_s']:g} s: {last}"

@@ -18,7 +18,7 @@ from typing import Any, TextIO
 
 from tqdm import tqdm
 
-from master import figures, post_mortem, report
+from master import figures, physics, post_mortem, report, scene_remarks
 from master.bonded import open_bonded, signals
 from master.drive import Drive, open_drive
 from master.errors import RunError
@@ -83,14 +83,15 @@ def _simulated(scene: Scene, folder: Path, scratch: Path, screen: TextIO) -> Res
         _clear(folder)
         report.write_summary(folder / "summary.json", post_mortem.place_holder(scene.name, os.getpid(), drive.ledger.kinds))
         stream = stack.enter_context((folder / "signals.csv").open("w", encoding="utf-8"))
-        recorder = Recorder(drive.units, simulation.recording_step, simulation.snapshots, kept, stream)
+        every = None if isinstance(scene.sections, General) else simulation.recorded_every
+        recorder = Recorder(drive.units, every, simulation.snapshots, kept, stream)
         started = clock.perf_counter()
         ending = _march(drive, recorder, scene, screen, calm)
         wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
         if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
             recorder.record_shape(drive.time)
-        account: dict[str, Any] = {"coupling": drive.scheme, "start_remarks": drive.remarks.start}
-        account |= {"steps_with_remarks": drive.remarks.count, "first_remarks": drive.remarks.first}
+        account: dict[str, Any] = {"coupling": drive.scheme, "physics": physics.acting(scene)}
+        account |= {"start_remarks": scene_remarks.of(scene) | drive.remarks.start, "remarks": drive.remarks.summary()}
         account |= {**_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
         account |= drive.ledger.summary()
         account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}

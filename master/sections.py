@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
@@ -45,15 +46,22 @@ class Simulation(Section):
 
     duration: float = _number("time simulated; statics alone need no [simulation]", "s", above=0.0)
     macro_step: float = _number("step of the coupling, the largest where it adapts", "s", above=0.0)
-    recording_step: float | None = _number("time between recorded shapes, once a step at most; absent: none", "s", above=0.0, default=None)
+    recording_step: float | None = _number(
+        "time between recorded shapes, once a step at most; absent: 0.5 s, or duration / 2000 if longer", "s", above=0.0, default=None
+    )
     snapshots: tuple[float, ...] = _number(
-        "instants drawn in figure 3 beside start and end; those after the end are ignored", "s", min=0.0, default=()
+        "instants drawn in figure 3 beside start and end; of which there are none after the end", "s", min=0.0, default=()
     )
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.macro_step > self.duration:
             raise ValueError(f"macro_step = {self.macro_step:g}: must be <= duration = {self.duration:g} s")
+
+    @property
+    def recorded_every(self) -> float:
+        """Time between recorded shapes [s]."""
+        return self.recording_step or max(0.5, self.duration / 2000.0)
 
 
 @dataclass(frozen=True)
@@ -72,11 +80,16 @@ class Coupling(Section):
         super().__post_init__()
         if self.on_violation == "refine" and not (self.rollback and self.scheme == "energy-consistent"):
             raise ValueError("on_violation = 'refine': must be stop or warn where a step is not repeated")
+        if self.scheme != "energy-consistent":
+            for name in ("tolerance", "rollback"):
+                if (value := getattr(self, name)) != (usual := type(self).__dataclass_fields__[name].default):
+                    given, allowed = json.dumps(value), json.dumps(usual)
+                    raise ValueError(f"{name} = {given}: must be {allowed} or absent with scheme = '{self.scheme}', which never iterates")
 
 
 @dataclass(frozen=True)
 class Release(Section):
-    """[start.release]: the vessel starts displaced from its equilibrium, at rest."""
+    """[start.release]: lets the vessel go displaced from its equilibrium, at rest."""
 
     heave: float = _number("down from the equilibrium", "m", default=0.0)
     roll: float = _number("starboard down", "rad", min=-0.5, max=0.5, default=0.0)
@@ -98,20 +111,33 @@ class Start(Section):
         max=math.pi,
         default=None,
     )
-    release: Release | None = None
+    release: Release | None = field(default=None, metadata={"doc": "lets the vessel go beside its equilibrium"})
 
 
 @dataclass(frozen=True)
 class TopMotion(Section):
     """[top_motion]: harmonic displacement of the top of a pipe alone, faded in by a half cosine; held where there is no such table."""
 
-    amplitude: tuple[float, float, float] = _number("amplitude in x, y, z; without [top_motion] the top of a pipe alone is held", "m")
+    amplitude: tuple[float, float, float] = _number("amplitudes along x, y, z, in e", "m", usual=(-50.0, 50.0))
     period: float = _number("period", "s", above=0.0)
-    ramp: float = _number("time of the fade-in", "s", min=0.0, default=0.0)
+    ramp: float | None = _number(
+        "time of the fade-in; absent: two periods; 0: the motion starts with a jump of velocity", "s", min=0.0, default=None
+    )
+
+    @property
+    def fade_in(self) -> float:
+        """Time of the fade-in [s]."""
+        return 2.0 * self.period if self.ramp is None else self.ramp
+
+    @property
+    def speed(self) -> float:
+        """Largest speed of the motion [m/s], with which it would start without fade-in."""
+        return 2.0 * math.pi / self.period * math.hypot(*self.amplitude)
 
     def displacement(self, time: float) -> np.ndarray:
         """Displacement (3,) [m] from the start at `time` [s]."""
-        fade = 0.5 * (1.0 - math.cos(math.pi * time / self.ramp)) if time < self.ramp else 1.0
+        ramp = self.fade_in
+        fade = 0.5 * (1.0 - math.cos(math.pi * time / ramp)) if time < ramp else 1.0
         return np.array(self.amplitude) * (fade * math.sin(2.0 * math.pi * time / self.period))
 
     def mean_velocity(self, time: float, step: float) -> np.ndarray:
@@ -124,8 +150,8 @@ class Load(Section):
     """A row of [[tables.environment]]: force and moment on the vessel at its centre of gravity, in the frame of [tables]."""
 
     time: float = _number("instant", "s")
-    force: tuple[float, float, float] = _number("force", "N", default=(0.0, 0.0, 0.0))
-    moment: tuple[float, float, float] = _number("moment", "N.m", default=(0.0, 0.0, 0.0))
+    force: tuple[float, float, float] = _number("force, in e or b as tables.frame says", "N", default=(0.0, 0.0, 0.0))
+    moment: tuple[float, float, float] = _number("moment, in e or b as tables.frame says", "N.m", default=(0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True)

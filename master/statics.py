@@ -18,11 +18,12 @@ from scipy.spatial.transform import Rotation
 
 from master.errors import RunError, UsageError
 from master.fmi.schema import build
-from master.scene import Scene
-from pipe_fmu import Pipe, PipeParameters, resolve
+from master.scene import DEFAULTS, Scene
+from pipe_fmu import Pipe, PipeParameters, resolve, validity
 from pipe_fmu.environment import Environment
 from pipe_fmu.statics.solve import Equilibrium
-from vessel_fmu.parameters import Start, VesselParameters
+from vessel_fmu import validity as vessel_validity
+from vessel_fmu.parameters import Start, VesselParameters, set_point
 from vessel_fmu.vessel import Vessel
 
 T = TypeVar("T")
@@ -46,12 +47,15 @@ def equilibrium(scene: Scene) -> Prepared:
     start = scene.sections.start
     pipe, vessel = parameters(scene)
     held = None if start.departure is None else Rotation.from_euler("ZY", [start.yaw, start.departure])
-    if vessel is None:
-        pipe = _resolved(pipe, np.array(pipe.top_position), held)
-        found = _hang(Pipe(pipe), np.array(pipe.top_position), held)
-        return Prepared(_placed(pipe, found), None, found)
-    even_keel = np.array([start.x, start.y, vessel.hang_off[2] - vessel.environment.depth])
-    return _floating(scene, _resolved(pipe, even_keel, held), vessel)
+    try:
+        if vessel is None:
+            pipe = _resolved(pipe, np.array(pipe.top_position), held)
+            found = _hang(Pipe(pipe), np.array(pipe.top_position), held)
+            return Prepared(_placed(pipe, found), None, found)
+        even_keel = np.array([start.x, start.y, vessel.hang_off[2] - vessel.environment.depth])
+        return _floating(scene, _resolved(pipe, even_keel, held), vessel)
+    except RunError as error:  # for which a wrong unit is a reason
+        raise RunError("; ".join([str(error), *validity.of_parameters(pipe)])) from None
 
 
 def parameters(scene: Scene) -> tuple[PipeParameters, VesselParameters | None]:
@@ -106,15 +110,29 @@ def report(scene: Scene) -> dict[str, Any]:
         "largest_bending_moment_N_m": float(pipe.largest_bending_moment(forces)),
         "lowest_point_m": float(found.position[:, 2].max()) + 0.0,
         "touchdown_s_m": touchdown,
+        "largest_von_mises_Pa": pipe.largest_von_mises(state, forces),
+        "utilisation": pipe.utilisation(state, forces) or None,
         "stable": bool(found.stable),
         "vessel_position_m": None if at.vessel is None else _without_noise(at.vessel.start.position).tolist(),
         "hold_force_N": None if at.vessel is None else list(at.vessel.hold_force),
+        "remarks": remarks(at),
         "s_m": pipe.s.tolist(),
         "position_e_m": _without_noise(found.position).tolist(),
         "tension_N": forces.tension.tolist(),
         "bending_moment_N_m": np.hypot(forces.moment[:, 1], forces.moment[:, 2]).tolist(),
         "shear_N": np.hypot(forces.shear[:, 0], forces.shear[:, 1]).tolist(),
     }
+
+
+def remarks(at: Prepared) -> list[str]:
+    """What the units will say of their start, one line each."""
+    pipe = Pipe(at.pipe)
+    state = pipe.at_rest(at.found)
+    used = pipe.utilisation(state, pipe.section_forces(state))
+    found = [*validity.of_parameters(at.pipe), *validity.look(pipe, validity.limits(pipe), state, used, validity.QUIET)[0]]
+    if at.vessel is not None:
+        found += [*vessel_validity.of_parameters(at.vessel), *vessel_validity.look(Vessel(at.vessel).start(), vessel_validity.QUIET)[0]]
+    return list(dict.fromkeys(found))
 
 
 def _floating(scene: Scene, pipe_parameters: PipeParameters, parameters: VesselParameters) -> Prepared:
@@ -156,6 +174,9 @@ def _floating(scene: Scene, pipe_parameters: PipeParameters, parameters: VesselP
         angle = float(np.arctan2(-first[2], first[0]))
         rest = relative * Rotation.from_euler("y", -angle)
         posed = replace(posed, departure_angle=angle, departure_rotation=_three(rest.as_rotvec()))
+    if posed.controller is not None:
+        x, y, yaw = set_point(posed)
+        posed = replace(posed, controller=replace(posed.controller, x=x, y=y, yaw=yaw))
     hold = _without_noise((-force[0], -force[1], -moment[2]))
     posed = _replaced("vessel", posed, hold_force=_three(hold))
     body = Vessel(posed)
@@ -180,8 +201,10 @@ def _pipe(scene: Scene, top: tuple[float, float, float]) -> PipeParameters:
     the amplitude of [top_motion] where it gives none itself.
     """
     mapping, (x, y, z), motion = scene.mapping["pipe"], top, scene.sections.top_motion
+    usual = {key.removeprefix("pipe."): value for key, value in DEFAULTS.items()}
     if motion is not None:
-        mapping = {"top_amplitude": math.hypot(*motion.amplitude)} | mapping
+        usual["top_amplitude"] = math.hypot(*motion.amplitude)
+    mapping = usual | mapping
     common, sections = mapping.get("section", {}), mapping.get("sections")
     if isinstance(common, dict) and isinstance(sections, list):
         mapping = mapping | {"sections": [common | entry if isinstance(entry, dict) else entry for entry in sections]}

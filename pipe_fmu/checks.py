@@ -1,7 +1,11 @@
-"""Numbers that know their unit and range, and one check of them all."""
+"""Numbers that know their unit and range, and one check of them all.
+
+The same file stands in both units, each of which must be complete by itself; a test keeps the copies equal.
+"""
 
 import math
-from dataclasses import field, fields
+from collections.abc import Iterator
+from dataclasses import field, fields, is_dataclass
 from typing import Any, Literal, get_args, get_origin
 
 BOUNDS = {
@@ -12,8 +16,10 @@ BOUNDS = {
 }
 
 
-def number(default: Any, unit: str | tuple[str, ...], doc: str, **bounds: float) -> Any:
-    """Dataclass field holding a number or a fixed tuple of numbers in `unit`, or in one each, within `bounds` (above, min, below, max)."""
+def number(default: Any, unit: str | tuple[str, ...], doc: str, **bounds: Any) -> Any:
+    """Dataclass field holding a number or a fixed tuple of numbers in `unit`, or in one each, within `bounds` (above, min, below, max);
+    beyond `usual`, a pair, it is allowed but `unusual`.
+    """
     return field(default=default, metadata={"unit": unit, "doc": doc, **bounds})
 
 
@@ -47,6 +53,20 @@ def check_number(name: str, value: Any, metadata: Any) -> None:
         if key in metadata and not holds(value, metadata[key]):
             bound, unit = shown(metadata[key]), metadata["unit"]
             raise ValueError(f"{name} = {shown(value)}: must be {sign} {bound}" + (f" {unit}" if unit not in ("", "1") else ""))
+
+
+def unusual(instance: Any, path: str) -> Iterator[str]:
+    """One line (key = value: usual range) for each number, here and in tables below, so far out that its unit may be wrong."""
+    for item in fields(instance):
+        value, name = getattr(instance, item.name), f"{path}.{item.name}"
+        for part, where in [(one, f"{name}[{i}]") for i, one in enumerate(value, 1)] if isinstance(value, tuple) else [(value, name)]:
+            if is_dataclass(part):
+                yield from unusual(part, where)
+            elif part and "usual" in item.metadata:
+                low, high = item.metadata["usual"]
+                if not low <= part <= high:
+                    unit = "" if item.metadata["unit"] == "1" else f" {item.metadata['unit']}"
+                    yield f"{where} = {part:g}{unit}: usually {low:g} to {high:g}; is it in this unit?"
 
 
 def shown(value: float) -> str:

@@ -25,25 +25,28 @@ class Section:
     """Cross-section: a tube, or the stiffnesses and masses that are given directly."""
 
     length: float | None = number(None, "m", "length of this section, foot to top (only in a list of sections)", above=0.0)
-    outer_diameter: float = number(0.4064, "m", "outer diameter of the steel", above=0.0)
+    outer_diameter: float = number(0.4064, "m", "outer diameter of the steel", above=0.0, usual=(0.01, 3.0))
     wall_thickness: float | None = number(0.0222, "m", "wall thickness", above=0.0)
-    youngs_modulus: float = number(207e9, "Pa", "Young's modulus E", above=0.0)
+    youngs_modulus: float = number(207e9, "Pa", "Young's modulus E", above=0.0, usual=(5e8, 1e12))
     poisson_ratio: float = number(0.3, "1", "Poisson's ratio", min=0.0, max=0.5)
-    density: float = number(7850.0, "kg/m3", "density of the wall", min=0.0)
-    contents_density: float = number(0.0, "kg/m3", "density of what fills the pipe", min=0.0)
-    coating_thickness: float = number(0.0, "m", "thickness of the coating (weight and buoyancy, no stiffness)", min=0.0)
-    coating_density: float = number(0.0, "kg/m3", "density of the coating", min=0.0)
-    drag_normal: float = number(1.2, "1", "D_2 = D_3 of eq. (30)", min=0.0)
-    drag_tangential: float = number(0.025, "1", "D_1 of eq. (30)", min=0.0)
-    rotational_damping: Vector3 = number((1.5, 1.5, 1.5), "N.s", "D_4, D_5, D_6 of eq. (32) per length, material frame", min=0.0)
-    axial_stiffness: float | None = number(None, "N", "EA, instead of the tube's", above=0.0)
-    shear_stiffness: float | None = number(None, "N", "GA_2 = GA_3, instead of the tube's", above=0.0)
-    torsional_stiffness: float | None = number(None, "N.m2", "GJ, instead of the tube's", above=0.0)
-    bending_stiffness: float | None = number(None, "N.m2", "EI_2 (and EI_3 unless given), instead of the tube's", above=0.0)
+    density: float = number(7850.0, "kg/m3", "density of the wall", min=0.0, usual=(500.0, 2e4))
+    contents_density: float = number(0.0, "kg/m3", "density of what fills the pipe", min=0.0, usual=(0.1, 5e3))
+    coating_thickness: float = number(0.0, "m", "thickness of the coating (weight and buoyancy, no stiffness)", min=0.0, usual=(1e-5, 1.0))
+    coating_density: float = number(0.0, "kg/m3", "density of the coating", min=0.0, usual=(50.0, 5e3))
+    yield_stress: float | None = number(None, "Pa", "yield stress of the wall; absent: no utilisation", above=0.0, usual=(1e6, 3e9))
+    drag_normal: float = number(1.2, "1", "D_2 = D_3 of eq. (30)", min=0.0, usual=(0.0, 5.0))
+    drag_tangential: float = number(0.025, "1", "D_1 of eq. (30)", min=0.0, usual=(0.0, 2.0))
+    rotational_damping: Vector3 = number((1.5, 1.5, 1.5), "N.s", "D_4, D_5, D_6 of eq. (32) per length, in the section's frame t", min=0.0)
+    axial_stiffness: float | None = number(None, "N", "EA, instead of the tube's", above=0.0, usual=(1e5, 1e12))
+    shear_stiffness: float | None = number(None, "N", "GA_2 = GA_3, instead of the tube's", above=0.0, usual=(1e4, 1e12))
+    torsional_stiffness: float | None = number(None, "N.m2", "GJ, instead of the tube's", above=0.0, usual=(1e-2, 1e12))
+    bending_stiffness: float | None = number(
+        None, "N.m2", "EI_2 (and EI_3 unless given), instead of the tube's", above=0.0, usual=(1e-2, 1e12)
+    )
     bending_stiffness_3: float | None = number(None, "N.m2", "EI_3, where it differs from EI_2", above=0.0)
-    mass: float | None = number(None, "kg/m", "m_P with contents and coating, instead of the tube's", above=0.0)
-    displaced_area: float | None = number(None, "m2", "area that displaces water, instead of the tube's", min=0.0)
-    rotational_inertia: Vector3 | None = number(None, "kg.m", "J_1, J_2, J_3 of eq. (27), instead of the tube's", above=0.0)
+    mass: float | None = number(None, "kg/m", "m_P with contents and coating, instead of the tube's", above=0.0, usual=(0.1, 2e4))
+    displaced_area: float | None = number(None, "m2", "area that displaces water, instead of the tube's", min=0.0, usual=(1e-5, 10.0))
+    rotational_inertia: Vector3 | None = number(None, "kg.m", "J_1, J_2, J_3 of eq. (27), in frame t, instead of the tube's", above=0.0)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -133,7 +136,7 @@ class AddedMass:
 class PipeParameters:
     """A pipe from its foot on the bed, at the origin, to the hang-off point."""
 
-    length: float = number(1200.0, "m", "unstretched length L", above=0.0)
+    length: float = number(1200.0, "m", "unstretched length L", above=0.0, usual=(1.0, 3e4))
     nodes: int = number(48, "1", "number of nodes", min=3, max=100000)
     tolerance: float | None = number(
         None, "1", "relative error allowed in tension and bending moments at rest; overrides `nodes`", min=1e-6, max=0.1
@@ -150,13 +153,15 @@ class PipeParameters:
     top_amplitude: float = number(0.0, "m", "amplitude with which the top oscillates: the mesh suits the waves it sends", min=0.0)
     section: Section = field(default_factory=Section, metadata={"doc": "the section, where there is one"})
     sections: tuple[Section, ...] = field(default=(), metadata={"doc": "sections from foot to top, instead of `section`"})
-    internal_damping: float = number(0.0, "s", "Kelvin-Voigt time: viscous section forces are this times C strain rate", min=0.0)
+    internal_damping: float = number(
+        0.0, "s", "Kelvin-Voigt time: viscous section forces are this times C strain rate", min=0.0, usual=(0.0, 1.0)
+    )
     numerical_damping: float = number(0.0, "1", "algorithmic dissipation: 0 none, 0.5 backward Euler on the strains", min=0.0, max=0.5)
     max_substeps: int = number(1, "1", "parts of a step that does not converge, a power of 3: for hosts without rollback", min=1, max=729)
     reference_force: Vector3 = number((0.0, 0.0, 0.0), "N", "from which force_change counts, in e: an export's pull at rest")
     reference_moment: Vector3 = number((0.0, 0.0, 0.0), "N.m", "from which moment_change counts, in e: an export's pull at rest")
-    added_mass: AddedMass | None = None
-    seabed: Seabed | None = None
+    added_mass: AddedMass | None = field(default=None, metadata={"doc": "switches on added mass across the section"})
+    seabed: Seabed | None = field(default=None, metadata={"doc": "switches on the bed at z = 0"})
     environment: Environment = field(default_factory=Environment, metadata={"doc": "sea and gravity"})
 
     def __post_init__(self) -> None:

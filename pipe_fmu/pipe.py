@@ -74,7 +74,11 @@ class Pipe:
 
     def largest_von_mises(self, state: PipeState, forces: SectionForces) -> float:
         """Largest von Mises stress [Pa] along the line, between the nodes too."""
-        return wall_stress.largest_von_mises(self.element_walls, self.s, state.position, forces)
+        return wall_stress.largest_von_mises(self.element_walls, self.s, state.position, forces)[0]
+
+    def utilisation(self, state: PipeState, forces: SectionForces) -> float:
+        """Largest von Mises stress over the yield stress along the line, between the nodes too; 0 where no section has a yield stress."""
+        return wall_stress.largest_von_mises(self.element_walls, self.s, state.position, forces)[1]
 
     def wall_tension(self, state: PipeState, forces: SectionForces) -> Array:
         """Force (n,) [N] in the wall at every node, at a joint in that of the section below."""

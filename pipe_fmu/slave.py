@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from . import loads, substeps
+from . import loads, substeps, validity
 from .arrays import Array
 from .model import resolve
 from .parameters import PipeParameters
@@ -23,7 +23,7 @@ _MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) 
 _IMPEDANCE = 3 * (3 * ("N.s/m",) + 3 * ("N.s/rad",)) + 3 * (3 * ("N.s",) + 3 * ("N.m.s/rad",))
 _AT_LEAST_ZERO = (
     *(port for port, (_, least) in LEDGER.items() if least == 0.0),
-    "pipe_length", "largest_bending_moment", "largest_von_mises", "newton_iterations", "newton_residual", "s",
+    "pipe_length", "largest_bending_moment", "largest_von_mises", "largest_utilisation", "newton_iterations", "newton_residual", "s",
 )  # fmt: skip
 
 
@@ -47,9 +47,9 @@ class PipeUnit:
 
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
-        self.state: Any = (self._pipe.straight(), np.zeros(6), np.zeros((6, 6)), 0, 0.0)  # of the right layout; see `initialize`
-        self.remark = ""  # what the host's log should say of the start, or of the last step that was done
-        self._most = parameters.max_substeps
+        self.state: Any = (self._pipe.straight(), np.zeros(6), np.zeros((6, 6)), 0, 0.0, validity.QUIET)  # the layout; see `initialize`
+        self.remark = ""  # what the host's log should say of the start, or of the last step that was done; a line each
+        self._most, self._limits, self._yields = parameters.max_substeps, validity.limits(self._pipe), _has_yield_stress(parameters)
         self._reference = np.array([*parameters.reference_force, *parameters.reference_moment])
         self._memo: dict[str, Array] = {}
         self._memo_of: Any = None
@@ -81,6 +81,10 @@ class PipeUnit:
             "largest_tension": (1, "N", "largest effective tension at the nodes"),
             "largest_bending_moment": (1, "N.m", "largest bending moment, between the nodes too"),
             "largest_von_mises": (1, "Pa", "largest von Mises stress in the wall, between the nodes too"),
+        }
+        if _has_yield_stress(parameters):
+            ports["largest_utilisation"] = (1, "1", "largest von Mises stress over the yield stress, between the nodes too")
+        ports |= {
             "newton_iterations": (1, "1", "corrections of the last step"),
             "newton_residual": (1, "1", "residual of the last step over the largest element force and 1e-3 of the inertial ones"),
             "s": (n, "m", "arc length of the nodes"),
@@ -106,9 +110,20 @@ class PipeUnit:
             return f"statics: no equilibrium: {found.unbalance(self._pipe.s)}"
         still = np.zeros(3)
         self._pipe.step(state, still, still, 1e-3)  # so that compiling its kernel belongs to the start, not to the first step
-        self.state = (state, found.top, found.stiffness, 0, found.residual)
-        self.remark = "" if found.stable else UNSTABLE
+        self.state = (state, found.top, found.stiffness, 0, found.residual, validity.QUIET)
+        remarks = [] if found.stable else [UNSTABLE]
+        self.remark = "\n".join([*remarks, *validity.of_parameters(self._pipe.parameters), *self._look()])
         return None
+
+    def _look(self) -> list[str]:
+        """Remarks on the present state, if it is beyond a limit by more than was said; remembers in the state what it says."""
+        *rest, told = self.state
+        utilisation = float(self.output("largest_utilisation")[0]) if self._yields else 0.0
+        words, told = validity.look(self._pipe, self._limits, rest[0], utilisation, told)
+        if words:
+            known, self.state = self._memo_of is self.state, (*rest, told)
+            self._memo_of = self.state if known else None  # what was computed of the state still holds
+        return words
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
         """Advance by h [s]; a message, and the state unchanged, if Newton's method does not converge, nor in sub-steps if allowed.
@@ -128,13 +143,14 @@ class PipeUnit:
                 return f"{what}{nor}: an element would be {result.flaw}; more nodes may help"
             corrections = f"no convergence after {result.iterations} corrections"
             return f"{what}: {corrections}{nor}, residual {result.residual:.2e} of the largest element force"
-        self.remark = ""
+        self.state = (result.state, result.top, result.impedance, result.iterations, result.residual, self.state[-1])
+        remarks = self._look()
         if len(parts) > 1:
-            self.remark = (
+            remarks.append(
                 f"{what}: done in {len(parts)} sub-steps of {min(parts):g} s or more, {result.iterations} corrections; pose and "
                 "work of the top are exact, but its velocity jumps at both ends of the step instead of being smooth"
             )
-        self.state = (result.state, result.top, result.impedance, result.iterations, result.residual)
+        self.remark = "\n".join(remarks)
         return None
 
     def output(self, name: str) -> Array:
@@ -146,7 +162,7 @@ class PipeUnit:
         return self._memo[name]
 
     def _compute(self, name: str) -> None:
-        state, top, impedance, iterations, residual = self.state
+        state, top, impedance, iterations, residual, _ = self.state
         memo = self._memo
         if name in ("force", "moment"):
             memo["force"], memo["moment"] = -top[:3], -top[3:]  # eq. (69)
@@ -194,6 +210,12 @@ class PipeUnit:
             "end_force": -end[:3],
             "end_moment": -end[3:],
         }
+        if self._yields:
+            self._memo["largest_utilisation"] = np.array([self._pipe.utilisation(state, forces)])
+
+
+def _has_yield_stress(parameters: PipeParameters) -> bool:
+    return any(section.yield_stress is not None for section in parameters.all_sections)
 
 
 def _optional(parameters: PipeParameters) -> dict[str, bool]:

@@ -115,7 +115,7 @@ def test_a_run_writes_every_file_of_the_results(still, tmp_path, capsys):
     assert printed.err == ""
 
 
-def test_shapes_are_recorded_once_a_step_at_most_and_the_stretch_without_them(still, tmp_path):
+def test_shapes_are_recorded_once_a_step_at_most_and_by_default(still, tmp_path):
     still()
     assert main(["run", *SHORT, "--set", "simulation.recording_step=0.01", "-o", str(tmp_path / "a")]) == 0
     with np.load(tmp_path / "a" / "shapes.npz") as shapes:
@@ -124,7 +124,9 @@ def test_shapes_are_recorded_once_a_step_at_most_and_the_stretch_without_them(st
     mapping = scene.mapping | {"simulation": {"duration": 2.0, "macro_step": 0.1}}
     result = run.simulate(from_mapping(mapping, "paper"), tmp_path / "b", io.StringIO())
     assert result.summary["stretch_m"] == pytest.approx(0.1)
-    assert not (tmp_path / "b" / "shapes.npz").exists()
+    with np.load(tmp_path / "b" / "shapes.npz") as shapes:
+        np.testing.assert_allclose(shapes["t"], (0.0, 0.5, 1.0, 1.5, 2.0))
+    assert (tmp_path / "b" / "fig8_bending.png").exists()
 
 
 @pytest.mark.parametrize(

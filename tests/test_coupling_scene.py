@@ -354,9 +354,10 @@ def test_the_run_ends_with_a_command_that_is_killed(folder, tmp_path):
 def test_what_a_unit_says_of_its_start_and_of_its_steps_is_in_the_report(folder, tmp_path, capsys):
     code, summary = ran(folder, tmp_path, failing("remark"))
     assert code == 0
-    assert summary["steps_with_remarks"] == {"coil": 30}
-    assert summary["first_remarks"] == {"coil": "planted remark, 50 % heard"}
-    assert summary["start_remarks"] == {"coil": "planted at the start, 10 % heard"}
+    (told,) = summary["remarks"]["coil"]
+    assert (told["times"], told["first"], told["last"]) == (30, "planted remark, 50 % heard", "planted remark, 50 % heard")
+    assert (told["first_s"], told["last_s"]) == (pytest.approx(2.1), pytest.approx(5.0))
+    assert summary["start_remarks"] == {"coil": ["planted at the start, 10 % heard"]}
     out = capsys.readouterr().out
     assert "coil start    planted at the start, 10 % heard" in out
-    assert "coil remarks  of 30 of 50 steps, first: planted remark, 50 % heard" in out
+    assert "coil remark   at 2.1 s: planted remark, 50 % heard; 30 times, last at 5 s: the same" in out

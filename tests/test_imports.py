@@ -17,8 +17,8 @@ FLOORS = {  # of pipe_fmu, from the ground up: a module imports from lower floor
     "step": 6, "statics": 6, "results": 6,
     "mesh": 7,
     "model": 8,
-    "pipe": 9, "substeps": 9,
-    "slave": 10,
+    "pipe": 9, "substeps": 9, "validity": 10,
+    "slave": 11,
 }  # fmt: skip
 WITH_UNITS = {  # modules of master that import the two units; no process that runs FMUs imports them
     "master.statics", "master.monolithic", "master.hard_cases", "master.sections", "master.prepare", "master.keys",

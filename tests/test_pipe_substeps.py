@@ -68,12 +68,12 @@ def test_where_a_step_fails_its_parts_arrive_with_the_energy_identity_kept_over_
         remarks.append(parts.remark)
         if refused is None:  # both are still in the same state
             refused = whole.step(k * h, h, held(velocity))
-            assert bool(parts.remark) == (refused is not None)
+            assert ("sub-steps" in parts.remark) == (refused is not None)
     assert "no convergence after" in refused
     assert "sub-steps" not in refused
-    told = [remark for remark in remarks if remark]
+    told = [line for remark in remarks for line in remark.splitlines() if "sub-steps of" in line]
     assert 1 < len(told) < count  # and the other steps are done in one
-    assert all("done in" in remark and "sub-steps of" in remark and "corrections" in remark for remark in told)
+    assert all("done in" in line and "corrections" in line for line in told)
 
 
 def test_a_step_that_fails_in_parts_too_says_so_and_leaves_the_state_alone():
@@ -180,7 +180,7 @@ def test_without_sub_steps_the_unit_hands_on_the_one_step_bit_for_bit():
     unit = begun(heave_case(nodes=12))
     plain, start = unit._pipe, unit.state[0]
     calls = []
-    unit._pipe = SimpleNamespace(step=lambda *a, **k: calls.append(a) or plain.step(*a, **k))
+    unit._pipe = SimpleNamespace(step=lambda *a, **k: calls.append(a) or plain.step(*a, **k), line=plain.line)
     assert unit.step(0.0, 0.2, held([0.1, 0.0, 0.2])) is None
     result = plain.step(start, np.array([0.1, 0.0, 0.2]), np.zeros(3), 0.2)
     assert len(calls) == 1

@@ -14,7 +14,7 @@ from vessel_fmu.vessel import Inputs, Vessel
 
 HOLD = 379.6e3  # N, horizontal pull of the 16 in pipe hanging tangentially to the bed; 316.7e3 N at x = 780 m
 PAPER = VesselParameters(
-    controller=Controller(),
+    controller=Controller(x=780.0, y=0.0, yaw=0.0),
     hold_force=(HOLD, 0.0, 0.0),
     start=Start(position=(804.72, 0.0, -799.935)),
     environment=Environment(current=Current(velocity=(0.0, 0.8, 0.0), start=10.0)),

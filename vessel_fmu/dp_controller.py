@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .attitude import Array
-from .parameters import VesselParameters, mass_matrix
+from .parameters import VesselParameters, mass_matrix, set_point
 
 GRID_TOLERANCE = 1e-6  # of a period: a step that begins this much early still takes the sample
 HORIZONTAL = [0, 1, 5]
@@ -65,7 +65,7 @@ def control_law(parameters: VesselParameters) -> Law | None:
         damping=2.0 * c.damping_ratio * w * mass,
         integral=c.integral_ratio * mass * w**3,
         limit=np.array([c.surge_limit, c.sway_limit, c.yaw_limit]),
-        set_point=np.array([c.x, c.y, c.yaw]),
+        set_point=np.array(set_point(parameters)),
         filter_time=c.filter_time,
         pull_time=c.feed_forward_time,
         tracking_time=1.0 / w,

@@ -14,7 +14,7 @@ from .checks import check_fields, number
 class Current:
     """Current of one heading; `velocity` at the surface times a factor of depth times a factor of time."""
 
-    velocity: tuple[float, float, float] = number((0.0, 0.0, 0.0), "m/s", "velocity at the surface, in e")
+    velocity: tuple[float, float, float] = number((0.0, 0.0, 0.0), "m/s", "velocity at the surface, in e", usual=(-5.0, 5.0))
     profile: Literal["linear", "uniform", "table"] = field(
         default="linear", metadata={"doc": "shape over the depth: linear to zero at the bed, uniform, or the table"}
     )
@@ -57,10 +57,10 @@ class Current:
 class Environment:
     """Sea and gravity."""
 
-    depth: float = number(800.0, "m", "water depth", above=0.0)
-    water_density: float = number(1025.0, "kg/m3", "density of sea water", above=0.0)
-    gravity: float = number(9.81, "m/s2", "acceleration of gravity", above=0.0)
-    current: Current | None = None
+    depth: float = number(800.0, "m", "water depth", above=0.0, usual=(1.0, 12e3))
+    water_density: float = number(1025.0, "kg/m3", "density of sea water", above=0.0, usual=(950.0, 1250.0))
+    gravity: float = number(9.81, "m/s2", "acceleration of gravity", above=0.0, usual=(9.7, 9.9))
+    current: Current | None = field(default=None, metadata={"doc": "switches on a current"})
 
     def __post_init__(self) -> None:
         check_fields(self)

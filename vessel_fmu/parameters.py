@@ -91,9 +91,9 @@ class HullDrag:
 class Controller:
     """Dynamic positioning: PID in surge, sway and yaw by pole placement, reference filter, feed-forward of the pipe's pull."""
 
-    x: float = number(780.0, "m", "set-point x, in e")
-    y: float = number(0.0, "m", "set-point y, in e")
-    yaw: float = number(0.0, "rad", "set-point heading")
+    x: float | None = number(None, "m", "set-point x of the centre of gravity, in e; absent: where the vessel starts")
+    y: float | None = number(None, "m", "set-point y of the centre of gravity, in e; absent: where the vessel starts")
+    yaw: float | None = number(None, "rad", "set-point heading; absent: that of the start", min=-math.pi, max=math.pi)
     start: float = number(30.0, "s", "time at which the controller takes over from the hold thrust")
     period: float = number(0.5, "s", "sampling period", above=0.0)
     natural_frequency: float = number(0.1, "rad/s", "w_n of the closed loop, K_p = M w_n^2", above=0.0)
@@ -129,20 +129,20 @@ class Start:
 class VesselParameters:
     """The whole vessel; None for `damping`, `drag` or `controller` leaves that part out."""
 
-    mass: float = number(6.3622e6, "kg", "mass m_V", above=0.0)
-    inertia: Vector3 = number((2.87307e8, 2.726143e9, 2.726143e9), "kg.m2", "roll, pitch, yaw inertia about the CG", above=0.0)
-    waterplane_area: float = number(1383.39, "m2", "A_wp", above=0.0)
+    mass: float = number(6.3622e6, "kg", "mass m_V", above=0.0, usual=(1e5, 1e9))
+    inertia: Vector3 = number((2.87307e8, 2.726143e9, 2.726143e9), "kg.m2", "roll, pitch, yaw inertia about the CG, in b", above=0.0)
+    waterplane_area: float = number(1383.39, "m2", "A_wp", above=0.0, usual=(50.0, 1e5))
     metacentric_height: float = number(2.144, "m", "transverse GM_T", above=0.0)
     longitudinal_metacentric_height: float = number(97.866, "m", "longitudinal GM_L, of trim about flotation_centre", above=0.0)
     flotation_centre: float = number(-5.0846, "m", "x_F of the centre of flotation from the CG, positive forward: C_35 = -x_F C_33")
-    hang_off: Vector3 = number((0.0, 0.0, 0.0), "m", "hang-off point r_t from the CG, in b")
+    hang_off: Vector3 = number((0.0, 0.0, 0.0), "m", "hang-off point r_t from the CG, in b", usual=(-300.0, 300.0))
     departure_angle: float = number(1.1760, "rad", "alpha of R_b^t = R_y(-alpha): pitch of the held pipe over the bow direction")
     departure_rotation: Vector3 = number((0.0, 0.0, 0.0), "rad", "rotation vector in b applied to the held section after alpha")
     hold_force: Vector3 = number((0.0, 0.0, 0.0), ("N", "N", "N.m"), "constant thrust until the controller starts: x, y in e, yaw moment")
     added_mass: AddedMass = field(default_factory=AddedMass)
     damping: LinearDamping | None = field(default_factory=LinearDamping)
     drag: HullDrag | None = field(default_factory=HullDrag)
-    controller: Controller | None = None
+    controller: Controller | None = field(default=None, metadata={"doc": "switches on dynamic positioning"})
     start: Start = field(default_factory=Start)
     environment: Environment = field(default_factory=Environment)
 
@@ -163,6 +163,13 @@ class VesselParameters:
             if abs(value) > limit:
                 rule = f"must be >= the hold thrust {abs(value):.6g} {unit}"
                 raise ValueError(f"controller.{mode}_limit = {limit:g}: {rule}")
+
+
+def set_point(parameters: VesselParameters) -> tuple[float, float, float]:
+    """Set-point x, y [m], in e, and heading [rad] of a vessel with a controller: what it names, else where the vessel starts."""
+    named, ((x, y, _), (_, _, yaw)) = parameters.controller, (parameters.start.position, parameters.start.attitude)
+    assert named is not None
+    return x if named.x is None else named.x, y if named.y is None else named.y, yaw if named.yaw is None else named.yaw
 
 
 def largest_coupling(entries: AddedMass | LinearDamping) -> str:

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from . import validity
 from .attitude import Array, angles_from_quaternion
 from .parameters import VesselParameters
 from .vessel import WORKS, Inputs, State, Vessel
@@ -42,8 +43,10 @@ class VesselUnit:
 
     def __init__(self, parameters: VesselParameters) -> None:
         self.vessel = Vessel(parameters)
-        self._state = self.vessel.start()
+        self._start = (self.vessel.start(), validity.QUIET)
+        self._state = self._start
         self._memo: dict[str, Array] = {}
+        self.remark = ""  # what the host's log should say of the start, or of the last step that was done; a line each
 
     @staticmethod
     def outputs(parameters: VesselParameters) -> dict[str, Port]:
@@ -85,22 +88,32 @@ class VesselUnit:
 
     def initialize(self, time: float, inputs: dict[str, Array]) -> str | None:
         """Take the pose, velocity and hold thrust of the parameters; never fails."""
-        self.state = self.vessel.start()
+        self.state = self._start
+        self.remark = "\n".join([*validity.of_parameters(self.vessel.parameters), *self._look()])
         return None
+
+    def _look(self) -> list[str]:
+        """Remarks on the present attitude, if it is beyond a limit by more than was said; remembers in the state what it says."""
+        state, told = self._state
+        words, told = validity.look(state, told)
+        if words:
+            self.state = (state, told)
+        return words
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
         """Step from `time`, s, by h, s; a message and the state unchanged if Newton did not converge."""
         force, moment = inputs["force"] + inputs["force_change"], inputs["moment"] + inputs["moment_change"]
         loads = Inputs(force, moment, **{name: inputs[name] for name in Inputs._fields[2:]})
-        result = self.vessel.step(self._state, time, h, loads)
+        result = self.vessel.step(self._state[0], time, h, loads)
         if not result.converged:
             return f"vessel: Newton stopped at a relative unbalance of {result.residual:.1e} after {result.iterations} iterations"
-        self.state = result.state
+        self.state = (result.state, self._state[1])
+        self.remark = "\n".join(self._look())
         return None
 
     @property
-    def state(self) -> State:
-        """The state; setting it restores everything exactly."""
+    def state(self) -> tuple[State, Array]:
+        """The state, and what was said of it; setting it restores everything exactly."""
         return self._state
 
     @state.setter
@@ -115,7 +128,7 @@ class VesselUnit:
         return self._memo[name]
 
     def _evaluate(self, name: str) -> dict[str, Array]:
-        state, vessel = self._state, self.vessel
+        state, vessel = self._state[0], self.vessel
         if name in WORKS:
             works = {work: state.works[i : i + 1] for i, work in enumerate(WORKS)}
             return works | {"control_work": works["control_work"] + vessel.hold_energy(state)}  # less what the hold's potential holds

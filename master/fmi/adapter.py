@@ -2,7 +2,7 @@
 
 Travels inside every exported FMU (relative imports only) and drives any class of the unit protocol: PARAMETERS,
 INPUTS, outputs(), initialize(), step(), output(), state (a tree of tuples, numbers and arrays, which has the layout of all
-states from the unit's making on), and where there is one `remark`, what the log should say of a step that was done; RANGES
+states from the unit's making on), and where there is one `remark`, what the log should say, line by line, of a step that was done; RANGES
 of its ports and their nominal() values by unit of measure. Answers to the host (see `failure`):
   - a step that does not converge, meets an input that is not finite, or is asked for out of order: logged, discard,
     the unit stands where it stood before;
@@ -134,7 +134,7 @@ class UnitSlave(Fmi2Slave):
         return message is None
 
     def _warn(self) -> None:
-        if remark := getattr(self.unit, "remark", ""):
+        for remark in getattr(self.unit, "remark", "").splitlines():
             self.log(printable(remark), Fmi2Status.warning)
 
     def _step(self, time: float, step: float) -> str | None:

@@ -24,6 +24,7 @@ class Wall(NamedTuple):
     contents: Array  # weight per volume of the contents, N/m3
     water: float  # that of the water
     depth: float  # m
+    yield_stress: Array  # Pa, infinite where it is not given
 
 
 def walls(parameters: PipeParameters, s: Array) -> tuple[Wall, Wall]:
@@ -47,10 +48,12 @@ def _wall(parameters: PipeParameters, s: Array) -> Wall:
             *one.radii,
             one.outer_area,
             one.contents_density * environment.gravity,
+            math.inf if one.yield_stress is None else one.yield_stress,
         )
         for one in at
     ]
-    return Wall._make([*np.array(columns).T.copy(), environment.water_density * environment.gravity, environment.depth])
+    *arrays, yields = np.array(columns).T.copy()
+    return Wall._make([*arrays, environment.water_density * environment.gravity, environment.depth, yields])
 
 
 def wall_tension(wall: Wall, position: Array, forces: SectionForces) -> Array:
@@ -92,12 +95,14 @@ def _wall_tension(wall, position, tension, out):
         out[i] = _in_wall(wall, i, tension[i], outside, inside) if wall.area[i] > 0.0 else tension[i]
 
 
-def largest_von_mises(wall: Wall, s: Array, position: Array, forces: SectionForces) -> float:
-    """Largest von Mises stress [Pa] along the line, between the nodes `s` (n,) too; `wall` that of the elements.
+def largest_von_mises(wall: Wall, s: Array, position: Array, forces: SectionForces) -> tuple[float, float]:
+    """Largest von Mises stress [Pa] along the line, between the nodes `s` (n,) too, and largest over the yield stress (0 without one).
 
-    Between nodes the bending moment is that of section_forces.bending_square; tension, torque and depth are linear.
+    `wall` is that of the elements. Between nodes the bending moment is that of section_forces.bending_square; tension, torque and depth
+    are linear.
     """
-    return float(_largest(wall, s, position, forces))
+    stress, utilisation = _largest(wall, s, position, forces)
+    return float(stress), float(utilisation)
 
 
 @inner
@@ -109,15 +114,16 @@ def _von_mises(wall, position, tension, moment, out):
 
 @inner
 def _largest(wall, s, position, forces):
-    largest, tension, moment = 0.0, forces.tension, forces.moment
+    largest, used, tension, moment = 0.0, 0.0, forces.tension, forces.moment
     for e in range(s.shape[0] - 1):
         for k in range(SAMPLES + 1):
             x = k / SAMPLES
             y = 1.0 - x
             bending = math.sqrt(max(0.0, bending_square(s, moment, forces.shear, e, x)))
             depth, pull = y * position[e, 2] + x * position[e + 1, 2], y * tension[e] + x * tension[e + 1]
-            largest = max(largest, _square(wall, e, depth, pull, bending, y * moment[e, 0] + x * moment[e + 1, 0]))
-    return math.sqrt(largest)
+            square = _square(wall, e, depth, pull, bending, y * moment[e, 0] + x * moment[e + 1, 0])
+            largest, used = max(largest, square), max(used, square / wall.yield_stress[e] ** 2)
+    return math.sqrt(largest), math.sqrt(used)
 
 
 @inner

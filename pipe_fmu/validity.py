@@ -1,0 +1,127 @@
+"""Where a line leaves what its equations, or its steel, bear; measured in every state, and said once each time it is half as bad again.
+
+- Below the sea floor: deeper than its radius under z = 0 where the scene has no bed.
+- Above the surface: by more than 1 % of the depth; weight, drag and pressure remain those in water.
+- In compression: effective tension of an element below zero by more than 1e-3 of the largest.
+- Past yield: von Mises stress over `yield_stress`; where a section has none, a wall of steel strained by more than 0.5 % (line pipe of
+  the highest grade, X120, yields at 0.4 %), or any other section by more than the 5 % of the law of small strains.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import Array
+from .checks import unusual
+from .compiled import kernel
+from .parameters import MOST_STRETCH, PipeParameters, Section
+from .pipe import Pipe
+from .step.state import PipeState
+
+QUIET = np.zeros(5)  # nothing said yet: below, above, compression, strain, yield
+STEEL_STRAIN, STEEL_MODULUS = 0.005, 150e9  # strain a steel wall may have without `yield_stress`; Pa, below which a wall is not of steel
+SURFACE, SLACK = 0.01, 1e-3  # of the depth, of the largest tension
+NO_STRAIN = 1e-7  # of EA: no more tension than this is none
+WORSE = 1.5  # times what was said last is said again
+HEAVIEST, DENSITIES = 5e4, (50.0, 2e4)  # N/m, kg/m3: submerged weights and mean densities beyond are those of no line
+
+
+class Limits(NamedTuple):
+    """What the measures of a line are held against."""
+
+    deepest: float  # m below z = 0, infinite over a bed
+    surface: float  # z of the water's surface, m
+    highest: float  # m above the surface
+    no_pull: float  # N, a tension that is none
+    radius: Array  # (n - 1,) of the wall, m
+    bearable: Array  # (n - 1,) strain, infinite where a section has a yield stress
+
+
+def limits(pipe: Pipe) -> Limits:
+    """Limits of a line."""
+    parameters = pipe.parameters
+    sections = parameters.all_sections
+    ends = np.cumsum([section.length or parameters.length for section in sections])
+    which = np.minimum(np.searchsorted(ends, 0.5 * (pipe.s[1:] + pipe.s[:-1])), len(sections) - 1)
+    return Limits(
+        np.inf if parameters.seabed is not None else 0.5 * max(section.hydrodynamic_diameter for section in sections),
+        -parameters.environment.depth,
+        SURFACE * parameters.environment.depth,
+        NO_STRAIN * float(pipe.line.stiffness[:, 0].max()),
+        np.array([0.0 if section.wall_thickness is None else section.radii[1] for section in sections])[which],
+        np.array([_bearable(section) for section in sections])[which],
+    )
+
+
+def _bearable(section: Section) -> float:
+    if section.yield_stress is not None:
+        return np.inf
+    return MOST_STRETCH if section.wall_thickness is None or section.youngs_modulus < STEEL_MODULUS else STEEL_STRAIN
+
+
+def look(pipe: Pipe, bounds: Limits, state: PipeState, utilisation: float, told: Array) -> tuple[list[str], Array]:
+    """One line on each kind that is beyond its limit and half as bad again as `told` (5,), and `told` with them.
+
+    `utilisation` is that of the yield stress in this state, 0 where there is none.
+    """
+    beyond, value, place = np.empty((3, 5))
+    beyond[4] = value[4] = utilisation
+    if not _measure(state.position, state.strain, pipe.line.stiffness, bounds, told, beyond, value, place):
+        return [], told
+    new = beyond > np.maximum(1.0, WORSE * told)
+    (deepest, above, least, strained, _), place = value.tolist(), place[:4].astype(int)
+    s, middle = pipe.s[place], 0.5 * (pipe.s[place] + pipe.s[np.minimum(place + 1, len(pipe.s) - 1)])
+    bearable = float(bounds.bearable[place[3]])
+    over = "what any pipe steel bears elastically" if bearable == STEEL_STRAIN else "the law of small strains"
+    words = (
+        f"the line hangs {deepest:.2g} m below the sea floor at S = {s[0]:.4g} m, as there is no bed",
+        f"the line rises {above:.2g} m above the surface at S = {s[1]:.4g} m, where it keeps weight and drag of the water",
+        f"the line is in compression at S = {middle[2]:.4g} m: effective tension {least / 1e3:.3g} kN",
+        f"the line is strained by {100.0 * strained * bearable:.2g} % at S = {middle[3]:.4g} m, beyond {over}",
+        f"past yield: the largest stress is {utilisation:.3g} of the yield stress",
+    )
+    return [text for text, is_new in zip(words, new, strict=True) if is_new], np.where(new, beyond, told)
+
+
+def of_parameters(parameters: PipeParameters) -> list[str]:
+    """One line on each number that is not usual, and on each section whose weight is that of no line: a length may be in mm."""
+    found = [text.replace("pipe.environment.", "environment.") for text in unusual(parameters, "pipe")]
+    for i, section in enumerate(parameters.all_sections, 1):
+        name = f"sections[{i}]" if parameters.sections else "section"
+        weight, area = parameters.weight(section), section.outer_area
+        if abs(weight) > HEAVIEST:
+            found.append(f"pipe.{name}: weighs {weight:.3g} N/m in water, which no line does")
+        elif area > 0.0 and not DENSITIES[0] <= (density := section.mass_per_length / area) <= DENSITIES[1]:
+            found.append(f"pipe.{name}: has a mean density of {density:.3g} kg/m3, which no line has")
+    return found
+
+
+@kernel
+def _measure(position, strain, stiffness, bounds, told, beyond, value, place):
+    """Whether anything is beyond its limit and `WORSE` than `told` (5,).
+
+    Fills for each kind but yield how far it is `beyond` (5,), its `value` (5,) [m, m, N, share of the bearable strain] and the node or
+    element of its `place` (5,).
+    """
+    value[0], value[1], value[2], value[3] = -np.inf, -np.inf, np.inf, -np.inf
+    place[:] = 0.0
+    pull = bounds.no_pull
+    for i in range(position.shape[0]):
+        z = position[i, 2]
+        if z > value[0]:
+            value[0], place[0] = z, i
+        if bounds.surface - z > value[1]:
+            value[1], place[1] = bounds.surface - z, i
+    for e in range(strain.shape[0]):
+        force = stiffness[e, 0] * strain[e, 0]
+        pull = max(pull, abs(force))
+        if force < value[2]:
+            value[2], place[2] = force, e
+        share = (abs(strain[e, 0]) + bounds.radius[e] * np.hypot(strain[e, 4], strain[e, 5])) / bounds.bearable[e]
+        if share > value[3]:
+            value[3], place[3] = share, e
+    beyond[0], beyond[1], beyond[2], beyond[3] = value[0] / bounds.deepest, value[1] / bounds.highest, -value[2] / (SLACK * pull), value[3]
+    new = False
+    for k in range(5):
+        new |= beyond[k] > max(1.0, WORSE * told[k])
+    return new
