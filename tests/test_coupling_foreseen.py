@@ -117,7 +117,7 @@ def test_what_the_other_end_pulled_beyond_what_was_held_is_held_in_the_next_step
     foreseen, held = Foreseen(Body(np.eye(2)), Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
     foreseen.owe(np.zeros(2), np.array([0.05, 0.02]))  # N s
     given, flow, wanted = foreseen.take(0.0, 0.1, held)
-    np.testing.assert_allclose(given, held + [0.5, 0.2], atol=1e-15)
+    np.testing.assert_allclose(given, held + np.array([0.5, 0.2]), atol=1e-15)
     np.testing.assert_allclose(flow, 0.05 * given, atol=1e-15)  # of a unit mass from rest
     np.testing.assert_array_equal(wanted, flow)
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import units
 from pythonfmu.builder import FmuBuilder
 from units.toys import BODY
 
-import units
 from master.__main__ import main
 from master.bond import Bond, Pair
 from master.bonded import open_bonded
