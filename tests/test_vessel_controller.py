@@ -229,7 +229,7 @@ def test_the_hold_thrust_is_held_against_the_limits_along_the_heading(yaw):
     hold = (2e5 * np.cos(yaw), 2e5 * np.sin(yaw), 0.0)
     start, weak = Start(attitude=(0.0, 0.0, yaw)), Controller(surge_limit=2.001e5, sway_limit=1.0)
     VesselParameters(controller=weak, hold_force=hold, start=start)
-    with pytest.raises(ValueError, match="controller.surge_limit = 199000: must be >= the hold thrust 200000 N"):
+    with pytest.raises(ValueError, match=r"controller\.surge_limit = 199000: must be >= the hold thrust 200000 N"):
         VesselParameters(controller=replace(weak, surge_limit=1.99e5), hold_force=hold, start=start)
-    with pytest.raises(ValueError, match="controller.sway_limit = 1: must be >= the hold thrust 200000 N"):
+    with pytest.raises(ValueError, match=r"controller\.sway_limit = 1: must be >= the hold thrust 200000 N"):
         VesselParameters(controller=weak, hold_force=(-hold[1], hold[0], 0.0), start=start)
