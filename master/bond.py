@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fmi.ports import finite
-from .fmu import Fmu, Names, StepFailed
+from .fmu import Fmu, Names, StepFailed, StepRejected
 
 Vector = NDArray[Any]
 Matrix = NDArray[Any]
 
 _INCREMENT = 1e3  # floors: flow increment of a difference quotient, far above the units' Newton noise
 _RELATIVE_INCREMENT = 1e-3  # of the effort
+_SAME = 1e-9  # of an answer: a unit that is restored repeats a step to its own round-off
 
 
 @dataclass(frozen=True)
@@ -189,6 +190,17 @@ class FmuEnd:
         if not finite(values):
             raise self._broken(time, step)
         return values[free.size :], self._signs * values[: free.size]
+
+    def restores(self, time: float, step: float, held: Vector) -> bool:
+        """Whether two steps with `held` from one saved state answer alike, where the unit takes such steps; it stands as before."""
+        self.begin()
+        try:
+            first, second = (self.solve(time, step, held) for _ in range(2))
+        except StepRejected:
+            return True
+        finally:
+            self.cancel()
+        return bool(np.abs(second - first).max() <= _SAME * np.abs(first).max())
 
     def _step(self, time: float, step: float, ports: tuple[str, ...], values: Vector) -> None:
         if self._saved is not None and self._moved:

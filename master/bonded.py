@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from master.bond import end_value_ends, impedance_end, mobility_end
+from master.bond import Bond, FmuEnd, end_value_ends, impedance_end, mobility_end
 from master.coupling import coupling
 from master.drive import OnBond, Row
+from master.errors import UsageError
 from master.fmu import Fmu
 from master.ledger import Ledger
 from master.recorder import Signal
@@ -28,7 +29,9 @@ class Effort:
 
 
 class Bonded(OnBond):
-    """Two initialised FMUs; see `master.drive.Drive`."""
+    """Two initialised FMUs; see `master.drive.Drive`. Raises UsageError where one claims rollback that it has not."""
+
+    _ends: tuple[FmuEnd, FmuEnd]
 
     def __init__(self, scene: General, wiring: Wiring) -> None:
         table, rules, bond = scene.bond, scene.coupling, wiring.bond()
@@ -41,12 +44,23 @@ class Bonded(OnBond):
                 impedance_end(impedance, bond, table.impedance_derivative or None, rules.rollback, table.yielding),
                 mobility_end(mobility, bond, table.mobility_derivative or None, rules.rollback),
             )
+            self._check_rollback(bond)
         else:
             self._ends = end_value_ends(impedance, mobility, bond)
         reported = [(wiring.fmus[name], scene.units[name].energy) for name in (table.impedance, table.mobility)]
         sources = [(fmu, energy.columns) for fmu, energy in reported if energy is not None]  # of both or, checked before, of neither
-        self.ledger = Ledger(sources, rules.energy_check, rules.on_violation, bond.idle_power)
+        rest = self._macro_step * float(bond.idle_power(self._ends[0].result()))
+        self.ledger = Ledger(sources, rules.energy_check, rules.on_violation, bond.idle_power, rest)
         self._coupling = coupling(rules.scheme, *self._ends, bond, self._macro_step, rules.tolerance, self.ledger.check)
+
+    def _check_rollback(self, bond: Bond) -> None:
+        """Save, step, restore, step of every end that claims to roll back, under more than it holds at rest. Raises UsageError."""
+        impedance, mobility = self._ends
+        flow, effort = mobility.result(), impedance.result()
+        for end, held in ((impedance, flow + bond.flow_increments()), (mobility, effort + bond.effort_increments(effort))):
+            if end.rollback and not end.restores(self.time, self._macro_step, held):
+                claim = f"unit {end.fmu.name} claims to restore a saved state and does not (two steps from one state answer differently)"
+                raise UsageError(f"coupling.rollback = true: must be false, for {claim}")
 
     @property
     def scheme(self) -> str:

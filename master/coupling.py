@@ -19,6 +19,9 @@ Else V_free and Y are taken anew at the f found, and one more solve, with the V 
 yielding the second round is exact where f is linear in V, and two solves make a step; one does where nothing happens, and more where the
 extrapolation fails.
 
+A mobility end that cannot roll back is solved once, with the f found against its law (see `master.foreseen`). The impedance end is then
+solved again for the V that this answered, changed by what little keeps the bond from making energy.
+
 A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
 few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. No step is halved where
 an FMU takes but one length. A tolerance below the round-off of the ends' answers is met to that round-off: a residual that no longer falls
@@ -51,6 +54,7 @@ EASY = 3  # rounds of an easy step
 PATIENCE = 4  # easy steps in a row after which a halved step grows
 FIRST_STEP = 2.0**-10  # of the macro step, where one end is foreseen
 SMALLEST_STEP = 2.0**-12  # of the macro step
+CLOSING = 4  # solves of the impedance end, at most, that close the energy of a step whose other end cannot roll back
 
 
 class EnergyConsistent:
@@ -58,8 +62,6 @@ class EnergyConsistent:
 
     `check` sees a step before it is committed (the ends' outputs are those of its end) and may send it back.
     """
-
-    words: str = "energy-consistent, iterated with rollback"
 
     def __init__(
         self, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
@@ -77,6 +79,11 @@ class EnergyConsistent:
         self._converged = False
         self._easy = 0  # steps of the wanted length that took few rounds, in a row
         self._exchanged = 0.0  # so far [J]
+
+    @property
+    def words(self) -> str:
+        """What is done, for the report."""
+        return "energy-consistent, iterated with rollback"
 
     def advance(self, time: float, limit: float) -> Step:
         """One accepted step from `time`, at most to `time` + `limit`.
@@ -244,18 +251,63 @@ class OneSided(EnergyConsistent):
         super().__init__(impedance, self._foreseen, bond, macro_step, tolerance, check)
         if self._smallest < macro_step:
             self.wanted, self._easy = FIRST_STEP * macro_step, -PATIENCE  # all short steps add up to whole macro steps
-        how = "iterated on one side" if impedance.rollback else "not iterated"
-        self.words = (
-            f"energy-consistent, {how}: without rollback a unit is solved once a step, with its answer foreseen; "
-            "a residual and a kinematic gap are left"
+
+    @property
+    def words(self) -> str:
+        """What is done, and the largest kinematic gap that it left so far."""
+        how, left = "iterated on one side", "a gap"
+        if not self.impedance.rollback:
+            how, left = "not iterated", "a residual and a gap"
+        pairs = zip(self.bond.pairs, self._foreseen.largest_gaps, strict=True)
+        gaps = ", ".join(f"{pair.flow} x s {gap:.2g}" for pair, gap in pairs)
+        return (
+            f"energy-consistent, {how}: without rollback a unit is solved once a step, with its answer foreseen; {left} is left "
+            f"(largest: {gaps}) and made up for in the next step"
         )
 
     def _attempt(self, time: float, step: float) -> Step:
         trial = super()._attempt(time, step) if self.impedance.rollback else self._met(time, step)
         if not self._converged:
             return trial
-        flow = self._foreseen.take(time, step, trial.effort, trial.flow)
-        return replace(trial, flow=flow, residual=step * float(trial.effort @ (flow - trial.flow)))
+        held, flow, wanted = self._foreseen.take(time, step, trial.effort)
+        if self.impedance.rollback and self._outweighed():
+            trial = self._followed(trial, held, flow, wanted)
+        else:
+            trial = replace(trial, residual=step * float(held @ flow - trial.effort @ trial.flow))
+        self._foreseen.owe(step * (flow - trial.flow), step * (trial.effort - held))
+        return trial
+
+    def _outweighed(self) -> bool:
+        """Whether the mobility end yields less than the impedance end, Y Z < 1: an error of the foreseen flow is then small to it."""
+        slope = self.impedance.derivative()
+        if slope is not None:
+            self._Z = -slope
+        return bool(np.abs(np.linalg.eigvals(self._Y @ self._Z)).max() < 1.0)
+
+    def _followed(self, trial: Step, held: Vector, flow: Vector, wanted: Vector) -> Step:
+        """The impedance end moved with a mobility end that has answered `held` with `flow`, so that the bond makes no energy.
+
+        It is told the flow `wanted`, and what little besides closes the energy: least by the flows that count, along d(f.V)/dV.
+        """
+        step, start, Z = trial.step, wanted, self._Z
+        try:
+            effort = self.impedance.solve(trial.time, step, start)
+        except StepRejected:
+            start, effort = trial.flow, self.impedance.solve(trial.time, step, trial.flow)
+        rate = effort - Z.T @ start
+        along, told = self.bond.flow_increments() ** 2 * rate, start
+        made, share = float(held @ flow - effort @ start), 0.0
+        change = made / size if (size := float(rate @ along)) > 0.0 else 0.0
+        for _ in range(CLOSING):
+            done = Step(trial.time, step, told, effort, step * made, trial.rounds)
+            if change == 0.0 or abs(done.residual) <= self.tolerance * self._energy_scale(done):
+                break
+            share += change
+            told, before = start + share * along, made
+            effort = self.impedance.solve(trial.time, step, told)
+            made = float(held @ flow - effort @ told)
+            change = change * made / (before - made) if before != made else 0.0
+        return Step(trial.time, step, told, effort, step * made, trial.rounds)
 
     def _met(self, time: float, step: float) -> Step:
         """The impedance end solved once, on the law of the other."""

@@ -141,8 +141,13 @@ class Fmu:
     # ports
 
     def get(self, names: Names) -> NDArray[np.float64]:
-        """Values of one real port or of several, concatenated."""
-        channel = self._channels.get(names) or self._channel(names)
+        """Values of one port or of several, concatenated; those of integer ports as real numbers."""
+        channel = self._channels.get(names)
+        if channel is None:
+            every = (names,) if isinstance(names, str) else names
+            if any(self.port(name).kind == "Integer" for name in every):
+                return np.concatenate([self._integers(name) if self.port(name).kind == "Integer" else self.get(name) for name in every])
+            channel = self._channel(names)
         if self._get_real(self._component, channel.references, channel.size, channel.pointer) > 1:
             raise self._failure(f"get {names}")
         return channel.values.copy()
@@ -215,6 +220,9 @@ class Fmu:
         return state
 
     # inside
+
+    def _integers(self, name: str) -> NDArray[np.float64]:
+        return np.array(self._call(f"get {name}", self._fmu.getInteger, self.port(name).references), dtype=float)
 
     def _channel(self, names: Names) -> _Channel:
         ports = [self.port(name) for name in ((names,) if isinstance(names, str) else names)]

@@ -1,14 +1,14 @@
-"""What a step without rollback knows of the mobility end: its answer, foreseen, and made good once it is known.
+"""What a step without rollback knows of the mobility end: its answer, foreseen, and what both ends make up for once it is known.
 
-The end answers V = r + Y f. Its slope Y is that of the last step (port or directional derivatives, else measured over the steps so far), in
-proportion to the step's length as a mass has it. What its state contributes, r, is extrapolated in the way that lately foresaw best: as
-r = v + h a, with the velocity v at the end of the last step, v_new = 2 V - v, and the acceleration a without f; as r = v + h (a + d v),
-with a decay d <= 0 fitted to each component; or as such. The impedance end solves its step against that law, by iteration as in
-`master.coupling` or, where it yields, at once. The mobility end then steps with the f found.
+The end answers V = r + Y f. Where it tells the slope Y (port or directional derivatives), what its state contributes, r, is extrapolated in
+the way that lately foresaw best: as r = v + h a, with the velocity v at the end of the last step, v_new = 2 V - v, and the acceleration a
+without f; as r = v + h (a + d v), with a decay d <= 0 fitted to each component; or as such. Where it does not, r and Y are found from
+the steps so far, see `master.mobility_law`. The impedance end solves its step against that law, by iteration as in `master.coupling` or,
+where it yields, at once. The mobility end then steps with the f found.
 
-Both hold the same f, whatever the ratio of their masses. What the mobility end moves beyond what was foreseen, the impedance end makes up
-for in the next step: a kinematic gap is left, small where the motion is smooth, and a residual H f . (V - V foreseen). The first steps are
-short, since nothing is known yet.
+What it moves beyond what the impedance end was made to follow, a kinematic gap, that end makes up for in the next step; what the impedance
+end then pulls beyond what the mobility end held, an impulse, is added to what that holds in the next step. Both are small where the motion
+is smooth. The first steps are short, since nothing is known yet.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ import numpy as np
 from .bond import Bond, Matrix, Vector
 from .extrapolation import Extrapolation
 from .fmu import StepRejected
+from .mobility_law import MeasuredLaw
 from .step import CouplingFailed, End
 
 MEMORY = 0.5  # per step: how fast a foresight's past failure is forgotten
 
-FIT = 0.9  # per step: weight of the past in the measured slope
-REGULAR = 1e-6  # of the data: below it a direction counts as not seen
+FIT = 0.9  # per step: weight of the past in the fitted decay
 
 
 class Foreseen:
@@ -35,19 +35,13 @@ class Foreseen:
     rollback, yields = True, False
 
     def __init__(self, end: End, bond: Bond) -> None:
-        self.end = end
-        self.varies = end.varies
-        flow, self._scale = end.result(), bond.flow_increments()
-        self._velocity, self._time, self._step = flow, 0.0, 0.0
-        self._squares = self._products = np.zeros((bond.size, bond.size))  # of changes of the effort, of those with accelerations
-        self._seen: deque[tuple[Vector, Vector]] = deque(maxlen=3)  # accelerations and efforts of the last steps
-        self._slope = np.zeros((bond.size, bond.size))  # Y over the length of its step
-        self._plain = Extrapolation(flow, flow, self._size)
-        self._inert, self._damped = (Extrapolation(np.zeros(bond.size), np.zeros(bond.size), self._size) for _ in range(2))
-        self._errors = np.zeros(3)
-        self._past: deque[tuple[Vector, Vector]] = deque(maxlen=3)  # accelerations without f, and velocities before
-        self._decay, self._numerator, self._denominator = (np.zeros(bond.size) for _ in range(3))
-        self._behind = np.zeros(bond.size)  # what the impedance end has still to make up for
+        self.end, self.varies = end, end.varies
+        self._time = self._step = 0.0
+        self._told, self._measured = TellingLaw(end.result(), bond), MeasuredLaw(end.result(), bond.flow_increments())
+        self._tells = True  # until it does not
+        self._slope = np.zeros((bond.size, bond.size))  # Y of the last step solved
+        self._gap = self._impulse = np.zeros(bond.size)  # to be made up for
+        self._sizes, self.largest_gaps = bond.sizes, np.zeros(len(bond.pairs))
         self._taken = False
 
     @property
@@ -61,45 +55,43 @@ class Foreseen:
         self.end.begin()
 
     def solve(self, time: float, step: float, held: Vector) -> Vector:
-        """The flow that the end is expected to answer."""
+        """The flow that the end is expected to answer, with the gap closed."""
         self._time, self._step = time, step
         if self.end.rollback:
             flow, slope = self.end.solve(time, step, held), self.end.derivative()
-            self._slope = self._slope if slope is None else slope / step
-            return flow + self._behind / step
-        best = int(np.argmin(self._errors))
-        return self._candidates(time, step)[best] + step * self._slope @ held + self._behind / step
+            self._slope = self._slope if slope is None else slope
+            return flow + self._gap / step
+        law = self._told if self._tells else self._measured
+        free, self._slope = law.at(time + step / 2, step)
+        return free + self._slope @ (held + self._impulse / step) + self._gap / step
 
-    def take(self, time: float, step: float, held: Vector, foretold: Vector) -> Vector:
-        """The flow that the end does answer, where the other end was told `foretold`.
+    def take(self, time: float, step: float, effort: Vector) -> tuple[Vector, Vector, Vector]:
+        """What the end holds, `effort` and the impulse owed; its answer; the flow that would close the gap.
 
         Raises CouplingFailed where it discards, for there is no way back, and FmuFailed.
         """
         self._taken = True
-        foreseen = self._candidates(time, step)
+        held = effort + self._impulse / step
         try:
             flow = self.end.solve(time, step, held)
         except StepRejected as rejection:
             raise CouplingFailed(time, step, float("nan"), f"{rejection}; it cannot roll back") from None
         slope = self.end.derivative()
-        velocity = 2.0 * flow - self._velocity
-        self._slope = self._measured((flow - self._velocity) / step, held) if slope is None else slope / step
-        free = flow - step * self._slope @ held
-        missed = [self._size(free - guess) for guess in foreseen]
-        self._errors = np.maximum(missed, MEMORY * self._errors)
-        middle = time + step / 2
-        self._plain.add(middle, free, free)
-        acceleration = (free - self._velocity) / step
-        self._fit_decay(acceleration)
-        smooth = acceleration - self._decay * self._velocity
-        self._inert.add(middle, acceleration, acceleration)
-        self._damped.add(middle, smooth, smooth)
-        self._velocity, self._behind = velocity, self._behind + step * (flow - foretold)
-        return flow
+        self._tells = slope is not None
+        if slope is None:
+            self._measured.add(time + step / 2, step, flow, held)
+        else:
+            self._told.add(time + step / 2, step, flow, held, slope)
+        return held, flow, flow + self._gap / step
+
+    def owe(self, gap: Vector, impulse: Vector) -> None:
+        """Leave a displacement and an impulse of this step to be made up for."""
+        self._gap, self._impulse = self._gap + gap, self._impulse + impulse
+        self.largest_gaps = np.maximum(self.largest_gaps, self._sizes(self._gap))
 
     def derivative(self) -> Matrix:
         """d(flow)/d(effort) of `solve`."""
-        return self._step * self._slope
+        return self._slope
 
     def meet(self, time: float, step: float, free: Vector, mobility: Matrix) -> None:
         """See `master.step.End`: it takes no flow."""
@@ -122,33 +114,41 @@ class Foreseen:
             raise CouplingFailed(self._time, self._step, float("nan"), "the check sent the step back, and an FMU cannot roll back")
         self.end.cancel()
 
-    def _measured(self, acceleration: Vector, effort: Vector) -> Matrix:
-        """The slope that best explains the changes of acceleration by those of the effort, symmetric and not negative.
 
-        Directions in which the effort has not changed have the slope of those in which it has. In units of the flows that count.
-        """
-        answer, cause = acceleration / self._scale, effort * self._scale
-        self._seen.append((answer, cause))
-        if len(self._seen) < 3:
-            return self._slope
-        change, of = (self._seen[0][k] - 2.0 * self._seen[1][k] + self._seen[2][k] for k in (0, 1))
-        self._squares = FIT * self._squares + np.outer(of, of)
-        self._products = FIT * self._products + np.outer(change, of)
-        size = float(np.trace(self._squares))
-        if size == 0.0:
-            return self._slope
-        mean = max(float(np.trace(self._products)) / size, 0.0) * np.eye(len(of))
-        ridge = REGULAR * size * np.eye(len(of))
-        slope = mean + np.linalg.solve(self._squares + ridge, (self._products - mean @ self._squares).T).T
-        values, vectors = np.linalg.eigh((slope + slope.T) / 2)
-        return np.outer(self._scale, self._scale) * (vectors * np.maximum(values, 0.0) @ vectors.T)
+class TellingLaw:
+    """The law of an end that tells its slope, which is in proportion to the step's length as a mass has it."""
+
+    def __init__(self, flow: Vector, bond: Bond) -> None:
+        self._scale, self._velocity = bond.flow_increments(), flow
+        self._slope = np.zeros((bond.size, bond.size))  # Y over the length of its step
+        self._plain = Extrapolation(flow, flow, self._size)
+        self._inert, self._damped = (Extrapolation(np.zeros(bond.size), np.zeros(bond.size), self._size) for _ in range(2))
+        self._errors = np.zeros(3)
+        self._past: deque[tuple[Vector, Vector]] = deque(maxlen=3)  # accelerations without f, and velocities before
+        self._decay, self._numerator, self._denominator = (np.zeros(bond.size) for _ in range(3))
+
+    def at(self, middle: float, step: float) -> tuple[Vector, Matrix]:
+        """r and Y of a step with this middle and length."""
+        return self._candidates(middle, step)[int(np.argmin(self._errors))], step * self._slope
+
+    def add(self, middle: float, step: float, flow: Vector, effort: Vector, slope: Matrix) -> None:
+        """Take in a step and judge the ways by it."""
+        free = flow - slope @ effort
+        missed = [self._size(free - guess) for guess in self._candidates(middle, step)]
+        self._errors = np.maximum(missed, MEMORY * self._errors)
+        acceleration = (free - self._velocity) / step
+        self._fit_decay(acceleration)
+        smooth = acceleration - self._decay * self._velocity
+        for law, value in ((self._plain, free), (self._inert, acceleration), (self._damped, smooth)):
+            law.add(middle, value, value)
+        self._velocity, self._slope = 2.0 * flow - self._velocity, slope / step
 
     def _size(self, error: Vector) -> Any:
         """Of an error of the flow, or of every row of several."""
         return np.abs(error / self._scale).max(axis=-1)
 
-    def _candidates(self, time: float, step: float) -> tuple[Vector, ...]:
-        middle, v = time + step / 2, self._velocity
+    def _candidates(self, middle: float, step: float) -> tuple[Vector, ...]:
+        v = self._velocity
         return (
             v + step * self._inert.at(middle)[0],
             v + step * (self._damped.at(middle)[0] + self._decay * v),

@@ -102,23 +102,30 @@ class Ledger:
 
     `tolerance` is what is allowed of the closure error, and of the interface residuals' amounts together, relative to the energy
     exchanged so far: the sum of |dB| of the first FMU (of a single FMU without a bond: of the largest change of any column); to it
-    comes ROUND_OFF of the largest column.
+    comes ROUND_OFF of the largest column. No less than `rest` [J] counts as exchanged: what the efforts do at flows that count as rest in a
+    macro step, of which the first steps may be small parts.
     `action` on a violation: "stop" raises EnergyCheckFailed, "refine" sends the step back to be halved and stops when
     that does not help, "warn" keeps the first complaint and goes on. Without sources, where no FMU reports energies, the
-    check is the bond's residual alone, summed with its sign; `idle` is then the power [W] that counts as nothing.
+    check is the bond's residual alone, summed with its sign; `idle` is then the power [W] that counts as nothing, and what may be lost to
+    round-off is that of the products of effort and flow, of which the work is the sum.
     """
 
     def __init__(
-        self, sources: Sequence[tuple[Source, Columns]], tolerance: float = 1e-8, action: Action = "stop", idle: Idle | None = None
+        self,
+        sources: Sequence[tuple[Source, Columns]],
+        tolerance: float = 1e-8,
+        action: Action = "stop",
+        idle: Idle | None = None,
+        rest: float = 0.0,
     ) -> None:
-        self.tolerance, self.action, self._idle = tolerance, action, idle
+        self.tolerance, self.action, self._idle, self._rest = tolerance, action, idle, rest
         self._accounts = [_Account(fmu, columns) for fmu, columns in sources]
         self._refused = 0
         self.exchanged = 0.0  # running totals [J]; the interface residual adds up absolute values
         self.interface_residual = self.closure = self.largest_closure = 0.0
         self.step_residual = 0.0
         self.largest = self._largest()  # magnitude so far of any column
-        self.allowed = ROUND_OFF * self.largest
+        self.allowed = self._allowed(0.0, self.largest)
         self.complaint = ""  # the first violation, in one line
 
     @property
@@ -143,7 +150,8 @@ class Ledger:
         if self._accounts:
             return self.record(step.time + step.step)
         moved = step.step * max(abs(float(step.effort @ step.flow)), self._idle(step.effort) if self._idle else 0.0)
-        return self._judge(step.time + step.step, self.exchanged + moved, self.closure + step.residual, step.residual)
+        largest = self.largest + step.step * float(np.abs(step.effort) @ np.abs(step.flow))
+        return self._judge(step.time + step.step, self.exchanged + moved, self.closure + step.residual, step.residual, largest)
 
     def record(self, time: float) -> bool:
         """As `check`, for a step that ended at `time`."""
@@ -153,12 +161,13 @@ class Ledger:
         exchanged = self.exchanged + accounts[0].moved
         closure = sum(account.closure for account in accounts)
         residual = sum(account.bond for account in accounts) if len(accounts) > 1 else 0.0
-        return self._judge(time, exchanged, closure, residual)
+        return self._judge(time, exchanged, closure, residual, max(self.largest, self._largest()))
 
-    def _judge(self, time: float, exchanged: float, closure: float, residual: float) -> bool:
-        accounts = self._accounts
-        largest = max(self.largest, self._largest())
-        allowed = self.tolerance * exchanged + ROUND_OFF * largest
+    def _allowed(self, exchanged: float, largest: float) -> float:
+        return self.tolerance * max(exchanged, self._rest) + ROUND_OFF * largest
+
+    def _judge(self, time: float, exchanged: float, closure: float, residual: float, largest: float) -> bool:
+        accounts, allowed = self._accounts, self._allowed(exchanged, largest)
         made = self.interface_residual + abs(residual)
         # the bond's residuals are inside the closure; judged by themselves too, so that neither another error nor each other can hide them
         passed = abs(closure) <= allowed and made <= allowed
@@ -183,9 +192,10 @@ class Ledger:
 
     def verdict(self) -> str:
         """The outcome in words."""
+        what = f"{self.exchanged:.3g} J exchanged" if self.exchanged >= self._rest else f"{self._rest:.3g} J of a macro step at rest"
         figures = (
             f"largest closure error {self.largest_closure:.2g} J, at the end {self.allowed:.2g} J allowed ({self.tolerance:.0e} of the "
-            f"{self.exchanged:.3g} J exchanged and {ROUND_OFF:.0e} of the largest column, {self.largest:.3g} J); "
+            f"{what} and {ROUND_OFF:.0e} of the largest column, {self.largest:.3g} J); "
             f"the bond made {self.interface_residual:.2g} J"
         )
         if not self._accounts:

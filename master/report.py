@@ -26,6 +26,8 @@ def summarise(run: Mapping[str, Any], signals: Table) -> dict[str, Any]:
     """
     time = float(signals.column("time")[-1])
     summary: dict[str, Any] = {**run, "duration_s": time, "realtime_factor": time / run["wall_s"] if run["wall_s"] else None}
+    made, exchanged = run["interface_residual_J"], run["exchanged_energy_J"]
+    summary["interface_residual_percent"] = 100.0 * made / exchanged if exchanged else None
     if "x" in signals:
         summary |= {
             "pose_gap_m": _largest(signals, "pose_gap"),
@@ -82,7 +84,9 @@ def screen(summary: Mapping[str, Any], title: str) -> str:
             ("largest bending", f"{bending:.2f} kN m, von Mises stress {stress:.1f} MPa{used}"),
             ("pipe length", f"{summary['pipe_length_m']:.4f} m at the end"),
         ]
-    left = f"the bond made {summary['interface_residual_J']:.2g} J of {summary['exchanged_energy_J']:.3g} J exchanged"
+    made, share = summary["interface_residual_J"], summary["interface_residual_percent"]
+    exchanged = f"{summary['exchanged_energy_J']:.3g} J exchanged" + ("" if share is None else f" ({share:.2g} %)")
+    left = f"the bond made {made:.2g} J of {exchanged}"
     rows += [("coupling", f"{summary['coupling']}; {left}"), ("energy check", summary["energy_check"].removeprefix("energy check "))]
     if summary["physics"]:
         rows.insert(0, ("physics", summary["physics"]))

@@ -85,8 +85,8 @@ class Wiring:
             found.append(tuple(ends))
         return found  # type: ignore[return-value]
 
-    def port(self, where: str, unit: str, name: str, causality: str) -> Port:
-        """The real port of this causality."""
+    def port(self, where: str, unit: str, name: str, causality: str, kinds: tuple[str, ...] = ("Real",)) -> Port:
+        """The port of this causality and one of these kinds."""
         fmu = self.fmus[unit]
         port = fmu.ports.get(name)
         if port is None:
@@ -94,8 +94,8 @@ class Wiring:
             raise UsageError(f"{where} = {name!r}: unit {unit} has no such {causality}; there are {there}")
         if port.causality != causality:
             raise UsageError(f"{where} = {name!r}: is of causality {port.causality} in unit {unit}, must be {causality}")
-        if port.kind != "Real":
-            raise UsageError(f"{where} = {name!r}: is {port.kind} in unit {unit}, must be Real")
+        if port.kind not in kinds:
+            raise UsageError(f"{where} = {name!r}: is {port.kind} in unit {unit}, must be {' or '.join(kinds)}")
         return port
 
     def check_steps(self) -> None:
@@ -119,7 +119,7 @@ class Wiring:
             raise UsageError(f"units.{silent[0]}.energy: must be given, as for the other unit on the bond, or for neither")
         for unit, table in self.scene.units.items():
             for name in table.outputs:
-                self.port(f"units.{unit}.outputs", unit, name, "output")
+                self.port(f"units.{unit}.outputs", unit, name, "output", ("Real", "Integer"))
             if table.energy is not None:
                 kinds = {key: getattr(table.energy, key) for key in ("stored", "supplied", "dissipated")} | {"bond": (table.energy.bond,)}
                 for key, names in kinds.items():

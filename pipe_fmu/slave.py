@@ -45,6 +45,8 @@ class PipeUnit:
     }
     RANGES: ClassVar[dict[str, tuple[float | None, float | None]]] = dict.fromkeys(_AT_LEAST_ZERO, (0.0, None))
 
+    COUNTS: ClassVar[tuple[str, ...]] = ("newton_iterations",)  # outputs that are integers
+
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
         self.state: Any = (self._pipe.straight(), np.zeros(6), np.zeros((6, 6)), 0, 0.0, validity.QUIET)  # the layout; see `initialize`

@@ -95,8 +95,8 @@ def test_the_measured_slope_is_symmetric_and_not_negative_whatever_the_end_does(
     foreseen, random = Foreseen(Body(np.array(inverse)), Bond((Pair("f", "v", 1e-6, 2),))), np.random.default_rng(1)
     for i in range(60):
         held, step = random.normal(size=2), 0.1
-        foretold = foreseen.solve(i * step, step, held)
-        foreseen.take(i * step, step, held, foretold)
+        foreseen.take(i * step, step, held)
+    foreseen.solve(60 * step, step, held)
     np.testing.assert_allclose(foreseen.derivative(), 0.1 / 2 * np.array(passive), atol=1e-4)
 
 
@@ -107,9 +107,19 @@ def test_what_the_other_end_did_not_follow_it_is_told_to_make_up_for(rollback):
     for end, missed in zip(ends, (0.0, 0.25), strict=True):
         end.rollback = rollback
         foreseen, held = Foreseen(end, Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
-        foreseen.take(0.0, 0.1, held, end.velocity + 0.05 * held - missed)  # the end answers `missed` more than was foretold
+        foreseen.take(0.0, 0.1, held)
+        foreseen.owe(np.full(2, 0.1 * missed), np.zeros(2))  # the end moved `missed` further than it was followed, for 0.1 s
         expected.append(foreseen.solve(0.1, 0.2, held))
     np.testing.assert_allclose(expected[1] - expected[0], 0.25 * 0.1 / 0.2, rtol=1e-12)
+
+
+def test_what_the_other_end_pulled_beyond_what_was_held_is_held_in_the_next_step():
+    foreseen, held = Foreseen(Body(np.eye(2)), Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
+    foreseen.owe(np.zeros(2), np.array([0.05, 0.02]))  # N s
+    given, flow, wanted = foreseen.take(0.0, 0.1, held)
+    np.testing.assert_allclose(given, held + np.array([0.5, 0.2]), atol=1e-15)
+    np.testing.assert_allclose(flow, 0.05 * given, atol=1e-15)  # of a unit mass from rest
+    np.testing.assert_array_equal(wanted, flow)
 
 
 def test_a_step_that_one_end_refuses_is_halved_while_the_other_stands_still_and_is_final_once_it_has_moved(files):

@@ -158,3 +158,25 @@ def test_what_is_allowed_is_said_with_its_floor(files):
         assert ledger.summary()["energy_check_allowed_J"] == ledger.allowed == ledger.row[ledger.names.index("allowed")]
         assert f"at the end {ledger.allowed:.2g} J allowed" in ledger.verdict()
         assert "; first failed at 0.1 s" in ledger.verdict()
+
+
+def test_the_largest_closure_error_is_kept_where_later_ones_are_smaller():
+    ledger = Ledger([], tolerance=1e-3)
+    for residual, closure in ((4e-3, 4e-3), (-3e-3, 1e-3), (-2e-3, -1e-3)):
+        assert ledger.check(Step(0.0, 1.0, np.array([20.0]), np.array([1.0]), residual, 1))
+        assert ledger.closure == pytest.approx(closure)
+    assert ledger.largest_closure == pytest.approx(4e-3)
+    assert ledger.summary()["interface_residual_J"] == pytest.approx(9e-3)
+
+
+def test_short_first_steps_at_rest_are_held_to_what_counts_as_rest_in_a_macro_step():
+    """A pull of 1 MN at a flow floor of 1e-6 m/s and a macro step of 0.1 s: 0.1 J, of which the check allows a hundred-millionth."""
+    step = Step(0.0, 1e-4, np.zeros(1), np.array([1e6]), 3e-12, 1)
+    assert Ledger([], idle=lambda effort: 1e-6 * float(np.abs(effort).sum()), rest=0.1).check(step)
+    with pytest.raises(EnergyCheckFailed, match="closure error"):
+        Ledger([], idle=lambda effort: 1e-6 * float(np.abs(effort).sum())).check(step)
+
+
+def test_products_of_effort_and_flow_that_cancel_leave_their_round_off():
+    across = Step(0.0, 1.0, np.array([1.0, 1.0]), np.array([1e6, -1e6]), 1e-7, 1)
+    assert Ledger([], tolerance=1e-8).check(across)

@@ -7,7 +7,7 @@ import pytest
 from units.toys import build_pair, tied
 
 from master.bond import Bond, Pair, impedance_end, mobility_end
-from master.coupling import CouplingFailed, coupling
+from master.coupling import CouplingFailed, EnergyConsistent, Step, coupling
 from master.extrapolation import Extrapolation
 from master.fmu import STEP_FAILURES
 from master.hang_off import hang_off
@@ -369,3 +369,24 @@ def test_a_reversed_effort_port_is_turned_round(files):
         pair.run(0.1, 3.0)
         good.run(0.1, 3.0)
         np.testing.assert_allclose(pair.state, good.state, rtol=1e-8, atol=1e-12)
+
+
+class Still:
+    """An end that stands."""
+
+    rollback, yields, varies, solves = True, False, True, 0
+
+    def result(self):
+        return np.zeros(2)
+
+
+def test_a_residual_is_measured_by_the_kinetic_energy_of_the_moved_end_up_to_the_mean_exchange():
+    """m v^2 / 2, where the pull stands across the motion and does no work."""
+    bond = Bond((Pair("effort", "flow", 1e-6, 2),))
+    scheme, step, mass = EnergyConsistent(Still(), Still(), bond, 0.1), 0.1, np.array([3.0, 5.0])
+    scheme._set_mobility(np.diag(step / 2.0 / mass))
+    across = Step(0.0, step, np.array([2.0, 0.0]), np.array([0.0, 7.0]), 0.0, 1)
+    assert scheme._energy_scale(across) == pytest.approx(step * 7.0 * 1e-6)  # nothing exchanged so far: only what counts as rest
+    for exchanged, expected in ((100.0, 0.5 * 3.0 * 2.0**2), (2.0, 2.0)):
+        scheme._exchanged = exchanged
+        assert scheme._energy_scale(across) == pytest.approx(expected)

@@ -17,6 +17,7 @@ import c_host
 import fmpy
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.ssp.ssd import read_ssd
 from fmpy.validation import validate_fmu
 from numba import types
@@ -176,7 +177,7 @@ def test_an_instance_is_gone_when_it_is_let_go(exported, unit, tmp_path):
         slave.exit_initialization_mode()
         state = slave._get_fmu_state()
         assert slave.do_step(0.0, STEP)
-        slave.get_real([i for i, variable in enumerate(slave.variables()) if variable.causality == "output"])
+        slave.get_real([i for i, variable in enumerate(slave.variables()) if variable.causality == "output" and variable.kind == "Real"])
         slave._set_fmu_state(state)
         living = weakref.ref(slave)
         del slave
@@ -274,6 +275,26 @@ def test_outputs_keep_to_their_ranges_and_sizes(exported, unit):
     assert (seen >= low).all()
     assert (seen <= high).all()
     assert (np.abs(seen) < 1e3 * nominal).all()
+
+
+def test_corrections_are_counted_by_a_discrete_integer(exported):
+    model = fmpy.read_model_description(str(exported / "pipe.fmu"))
+    variable = next(v for v in model.modelVariables if v.name == "newton_iterations")
+    assert (variable.type, variable.variability, variable.initial, variable.min) == ("Integer", "discrete", "calculated", "0")
+    assert (variable.unit, variable.nominal) == (None, None)  # as FMI has integers
+    others = [v for v in model.modelVariables if v.causality == "output" and v.name != "newton_iterations"]
+    assert {(v.type, v.variability) for v in others} == {("Real", "continuous")}
+    with Fmu(exported / "pipe.fmu") as fmu:
+        fmu.initialize()
+        assert fmu.get("newton_iterations") == [0.0]
+        fmu.set("velocity", [0.2, -0.1, 0.3])
+        fmu.step(0.0, STEP)
+        [count] = fmu._fmu.getInteger([variable.valueReference])
+        assert 1 <= count <= 20
+        mixed = fmu.get(("pipe_length", "newton_iterations", "newton_residual"))
+        np.testing.assert_array_equal(mixed, [fmu.get("pipe_length")[0], count, fmu.get("newton_residual")[0]])
+        with pytest.raises(FMICallException):
+            fmu._fmu.getReal([variable.valueReference])
 
 
 def test_what_it_says_it_can_do_it_can(exported):

@@ -223,3 +223,12 @@ def test_state_is_a_value_to_set_and_pickle():
     unit.state = saved
     unit.step(0.1, 0.1, inputs)
     np.testing.assert_array_equal(unit.output("force"), after)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
+def test_shear_factor_is_cowpers_for_a_thin_tube_and_for_a_solid_round_bar(poisson):
+    """G. R. Cowper (1966): 2 (1 + v) / (4 + 3 v) and 6 (1 + v) / (7 + 6 v)."""
+    for wall, expected in ((1e-7, 2.0 * (1.0 + poisson) / (4.0 + 3.0 * poisson)), (0.5, 6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson))):
+        section = Section(outer_diameter=1.0, wall_thickness=wall, poisson_ratio=poisson)
+        shear_modulus = 0.5 * section.youngs_modulus / (1.0 + poisson)
+        assert section.stiffness[1] / (shear_modulus * section.steel_area) == pytest.approx(expected, rel=1e-6)

@@ -15,7 +15,7 @@ from master.errors import RunError, UsageError
 from master.monolithic import march
 from master.prepared import prepare
 from master.scene import from_mapping
-from master.statics import equilibrium, report
+from master.statics import equilibrium, released, report
 from vessel_fmu.vessel import Vessel
 
 STEEL = {"outer_diameter": 0.4064, "wall_thickness": 0.025}
@@ -157,3 +157,15 @@ def test_a_load_in_the_axes_of_the_hull_turns_with_it_and_keeps_the_energy():
     assert ends["b", 1.5][1] > 0.9 * ends["b", 0.0][1] > 0.0
     with pytest.raises(UsageError, match="must be one of"):
         scene.load("free-decay", [f"tables={{environment={rows}, frame='n'}}"])
+
+
+def test_a_released_vessel_starts_by_so_much_deeper_rolled_and_pitched_and_the_pipe_hangs_from_there():
+    moved = {"heave": 1.5, "roll": 0.04, "pitch": 0.1}
+    free = from_mapping(FLOATING | {"start": {"x": 780.0, "yaw": 0.3, "release": moved}}, "released")
+    at = equilibrium(free)
+    found = released(free, at)
+    assert_allclose(found.vessel.start.position, np.add(at.vessel.start.position, (0.0, 0.0, 1.5)), atol=1e-12)
+    assert_allclose(found.vessel.start.attitude, np.add(at.vessel.start.attitude, (0.04, 0.1, 0.0)), atol=1e-12)
+    roll, pitch, yaw = found.vessel.start.attitude
+    lever = Rotation.from_euler("ZYX", [yaw, pitch, roll]).apply([-40.0, 5.0, 5.0])
+    assert_allclose(found.found.position[-1], found.vessel.start.position + lever, atol=1e-9)

@@ -212,3 +212,24 @@ def test_a_sample_is_not_due_before_the_start():
     after = sampled(law, state, 0, 30.0, np.zeros(3), np.zeros(3))
     assert due_sample(law, after, 30.4) is None
     assert due_sample(law, after, 31.7) == 3
+
+
+def test_the_loop_without_a_frequency_of_its_own_is_that_of_a_tenth_of_a_radian_per_second():
+    """K_p = M w_n^2, K_d = 2 M w_n, K_i = 0.2 w_n K_p at w_n = 0.1 rad/s."""
+    law, mass = control_law(VesselParameters(controller=Controller())), np.diag(mass_matrix(VesselParameters()))[[0, 1, 5]]
+    assert_allclose(law.stiffness, 0.01 * mass, rtol=1e-12)
+    assert_allclose(law.damping, 0.2 * mass, rtol=1e-12)
+    assert_allclose(law.integral, 2e-4 * mass, rtol=1e-12)
+    assert law.tracking_time == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("yaw", [0.6, -2.2])
+def test_the_hold_thrust_is_held_against_the_limits_along_the_heading(yaw):
+    """All of it ahead: within the surge limit, though sway can hardly push; turned the other way it would be beyond both."""
+    hold = (2e5 * np.cos(yaw), 2e5 * np.sin(yaw), 0.0)
+    start, weak = Start(attitude=(0.0, 0.0, yaw)), Controller(surge_limit=2.001e5, sway_limit=1.0)
+    VesselParameters(controller=weak, hold_force=hold, start=start)
+    with pytest.raises(ValueError, match=r"controller\.surge_limit = 199000: must be >= the hold thrust 200000 N"):
+        VesselParameters(controller=replace(weak, surge_limit=1.99e5), hold_force=hold, start=start)
+    with pytest.raises(ValueError, match=r"controller\.sway_limit = 1: must be >= the hold thrust 200000 N"):
+        VesselParameters(controller=weak, hold_force=(-hold[1], hold[0], 0.0), start=start)

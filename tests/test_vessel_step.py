@@ -405,3 +405,22 @@ def test_unsolvable_step_is_a_result_with_the_old_state():
     assert result.state is state
     with pytest.raises(ValueError, match=r"h = 0.0: must be > 0 s"):
         vessel.step(state, 0.0, 0.0, Inputs())
+
+
+def test_a_controller_outside_accelerates_the_vessel_by_its_force():
+    """From rest, over a short step: M v / h is the force; surge and sway in b, and the yaw moment."""
+    vessel = Vessel(replace(PARAMETERS, hold_force=(0.0, 0.0, 0.0), hang_off=(0.0, 0.0, 0.0), environment=Environment()))
+    force = np.array([2e5, -1e5, 3e6])
+    at_rest = vessel.start()._replace(position=np.zeros(3), quaternion=exp_quaternion(np.array([0.0, 0.0, 1.0]), 0.7))
+    state = vessel.step(at_rest, 0.0, 1e-3, Inputs(control_force=force)).state
+    got = mass_matrix(vessel.parameters) @ state.body_velocity / 1e-3
+    assert_allclose(got[[0, 1, 5]], force, rtol=1e-4)
+
+
+def test_the_potential_of_a_hold_thrust_is_minus_its_work_along_any_way():
+    vessel, rng = Vessel(replace(PARAMETERS, hold_force=(3e5, -1e5, 4e6))), np.random.default_rng(8)
+    start = vessel.start()
+    moved = rng.normal(size=3)
+    energy_there = vessel.hold_energy(start._replace(position=start.position + moved))
+    assert vessel.hold_energy(start) == 0.0
+    assert energy_there == pytest.approx(-(3e5 * moved[0] - 1e5 * moved[1]), rel=1e-9)

@@ -2,8 +2,9 @@
 
 Travels inside every exported FMU (relative imports only) and drives any class of the unit protocol: PARAMETERS,
 INPUTS, outputs(), initialize(), step(), output(), state (a tree of tuples, numbers and arrays, which has the layout of all
-states from the unit's making on), and where there is one `remark`, what the log should say, line by line, of a step that was done; RANGES
-of its ports and their nominal() values by unit of measure. Answers to the host (see `failure`):
+states from the unit's making on), and where there is one `remark`, what the log should say, line by line, of a step that was done;
+RANGES of its ports and their nominal() values by unit of measure, COUNTS, the outputs that are integers. Answers to the host (see
+`failure`):
   - a step that does not converge, meets an input that is not finite, or is asked for out of order: logged, discard,
     the unit stands where it stood before;
   - a step of no length or beyond a defined stop time, a refused parameter or initialisation, and a bug: fmi2Error with the
@@ -67,7 +68,7 @@ class UnitSlave(Fmi2Slave):
         self._fields = {(START if name.partition("[")[0] in taken else "") + name: name for name in fields}
         flat = {name: fields[own] for name, own in self._fields.items()}
         flat[CONFIGURATION] = schema.Parameter("String", "", doc="All parameters as JSON; empty: the built-in ones")
-        self.ports = Ports(inputs, outputs, flat, about["inputs"])
+        self.ports = Ports(inputs, outputs, flat, about["inputs"], getattr(self.unit_class, "COUNTS", ()))
         self.inputs = self.ports.start.copy()
         self._run_of_inputs = list(range(self.ports.n_inputs))
         self.changed: Mapping[str, Any] = {}  # parameters set by the host; replaced, never mutated
@@ -203,7 +204,8 @@ class UnitSlave(Fmi2Slave):
         causality, name, part = run
         if causality == "output":
             unit = self.unit
-            return (self._ready() if unit is None else unit).output(name)[part].tolist()
+            values = (self._ready() if unit is None else unit).output(name)[part].tolist()
+            return [int(value) for value in values] if name in self.ports.counts else values
         if causality == "input":
             return self.inputs[self.ports.input_slices[name]][part].tolist()
         return [self.ports.as_number(name, self.changed.get(name, self.ports.parameters[name].value))]

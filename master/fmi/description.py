@@ -111,7 +111,8 @@ def _type_name(variable: Variable) -> str:
 
 def _scalar_variable(variable: Variable, reference: int) -> Element:
     about = {"name": variable.name, "valueReference": str(reference), "causality": variable.causality}
-    about["variability"] = _VARIABILITY[variable.causality]
+    counts = variable.causality == "output" and variable.kind == "Integer"
+    about["variability"] = "discrete" if counts else _VARIABILITY[variable.causality]
     if variable.causality != "input":
         about["initial"] = "calculated" if variable.causality == "output" else "exact"
     if variable.doc:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .description import Variable, scalar_names
 from .schema import Parameter
 
-KINDS = ("Real", "Integer", "Boolean", "String")  # of FMI variables; ports are real
+KINDS = ("Real", "Integer", "Boolean", "String")  # of FMI variables; ports are real, or counts
 _TYPES = dict(zip((*KINDS, "Enumeration"), (float, int, bool, str, str), strict=True))
 LONGEST_TEXT = 10_000_000  # characters; a table of all nodes takes a fifth of it
 PortTable = Mapping[str, tuple[int, str | Sequence[str], str]]  # name -> (size, unit or those of the components, description)
@@ -36,8 +36,14 @@ class Ports:
     """The variables of one unit with one set of parameters."""
 
     def __init__(
-        self, inputs: PortTable, outputs: PortTable, parameters: Mapping[str, Parameter], start: Mapping[str, Sequence[float]] | None = None
+        self,
+        inputs: PortTable,
+        outputs: PortTable,
+        parameters: Mapping[str, Parameter],
+        start: Mapping[str, Sequence[float]] | None = None,
+        counts: Collection[str] = (),
     ) -> None:
+        self.counts = frozenset(counts)  # outputs that are integers
         self.inputs, self.outputs, self.parameters = dict(inputs), dict(outputs), dict(parameters)
         taken = inputs.keys() | outputs.keys()
         if twice := (inputs.keys() & outputs.keys()) | {name for name in parameters if name.partition("[")[0] in taken}:
@@ -67,7 +73,7 @@ class Ports:
         if not 0 <= reference < len(self._places):
             raise ValueError(f"value reference = {reference}: must be below {len(self._places)}")
         causality, name, _ = place = self._places[reference]
-        own = self.parameters[name].kind if causality == "parameter" else "Real"
+        own = self.parameters[name].kind if causality == "parameter" else "Integer" if name in self.counts else "Real"
         if kind != ("Integer" if own == "Enumeration" else own):
             raise ValueError(f"{name}: asked for as {kind}, is {own}")
         return place
@@ -130,8 +136,13 @@ class Ports:
                 table.append(Variable(name, causality, it.kind, it.unit, it.doc, value, it.minimum, it.maximum, items=it.items))
                 continue
             size, units, doc = ports[name]
+            bounds = ranges.get(name, (None, None))
+            if name in self.counts:  # FMI knows neither unit nor nominal value of these
+                least, most = (None if bound is None else int(bound) for bound in bounds)
+                table.append(Variable(scalar_names(name, size)[i], causality, "Integer", "", doc, None, least, most))
+                continue
             unit = units if isinstance(units, str) else units[i]
             start = float(self.start[reference]) if causality == "input" else None
-            bounds, size_of = ranges.get(name, (None, None)), nominal.get(name, nominal.get(unit))
+            size_of = nominal.get(name, nominal.get(unit))
             table.append(Variable(scalar_names(name, size)[i], causality, "Real", unit, doc, start, *bounds, size_of))
         return table

@@ -14,7 +14,7 @@ def main(resources: str, step: float) -> None:
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
     slave.do_step(0.0, step)
-    slave.get_real([i for i, variable in enumerate(slave.variables()) if variable.causality == "output"])
+    slave.get_real([i for i, variable in enumerate(slave.variables()) if variable.causality == "output" and variable.kind == "Real"])
 
 
 if __name__ == "__main__":
