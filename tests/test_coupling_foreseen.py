@@ -120,6 +120,10 @@ def test_what_the_other_end_pulled_beyond_what_was_held_is_held_in_the_next_step
     np.testing.assert_allclose(given, held + np.array([0.5, 0.2]), atol=1e-15)
     np.testing.assert_allclose(flow, 0.05 * given, atol=1e-15)  # of a unit mass from rest
     np.testing.assert_array_equal(wanted, flow)
+    foreseen.owe(np.array([0.03, -0.01]), -foreseen._impulse)  # m, and no impulse
+    given, flow, wanted = foreseen.take(0.1, 0.1, held)
+    np.testing.assert_allclose(given, held, atol=1e-15)
+    np.testing.assert_allclose(wanted - flow, [0.3, -0.1], atol=1e-15)
 
 
 def test_a_step_that_one_end_refuses_is_halved_while_the_other_stands_still_and_is_final_once_it_has_moved(files):

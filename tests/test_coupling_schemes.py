@@ -7,7 +7,7 @@ import pytest
 from units.toys import build_pair, tied
 
 from master.bond import Bond, Pair, impedance_end, mobility_end
-from master.coupling import CouplingFailed, EnergyConsistent, Step, coupling
+from master.coupling import CouplingFailed, EnergyConsistent, OneSolve, Step, coupling
 from master.extrapolation import Extrapolation
 from master.fmu import STEP_FAILURES
 from master.hang_off import hang_off
@@ -390,3 +390,28 @@ def test_a_residual_is_measured_by_the_kinetic_energy_of_the_moved_end_up_to_the
     for exchanged, expected in ((100.0, 0.5 * 3.0 * 2.0**2), (2.0, 2.0)):
         scheme._exchanged = exchanged
         assert scheme._energy_scale(across) == pytest.approx(expected)
+
+
+class Linear(Still):
+    """An end that answers in proportion, and tells no slope."""
+
+    def __init__(self, factor, offset):
+        self.factor, self.offset = factor, np.array(offset)
+
+    def result(self):
+        return self.offset
+
+    def solve(self, time, step, held):
+        return self.factor * held + self.offset
+
+    def derivative(self):
+        return None
+
+
+def test_what_one_solve_of_each_end_leaves_is_what_is_held_less_what_is_answered_times_the_flow():
+    scheme = OneSolve(Linear(-2.0, [3.0, 1.0]), Linear(0.5, [0.2, 0.0]), Bond((Pair("effort", "flow", 1e-6, 2),)), 0.1)
+    done = scheme.advance(0.0, 0.1)
+    held, flow = np.array([3.0, 1.0]), np.array([1.7, 0.5])
+    np.testing.assert_allclose(done.flow, flow)
+    np.testing.assert_allclose(done.effort, [-0.4, 0.0], atol=1e-15)
+    assert done.residual == pytest.approx(0.1 * float((held - done.effort) @ flow))
