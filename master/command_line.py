@@ -1,4 +1,4 @@
-"""The command line. Imports what a command needs only once it runs, see `master.guarded`."""
+"""The command line. Imports what a command needs only once it runs, see `master.process.child`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any, NoReturn
 
 from master.errors import RunError, UsageError
 from master.fmi.failure import visible
-from master.guarded import guarded
-from master.interrupts import breakable
-from master.screen import complain, drop, secure_streams
+from master.process.child import guarded
+from master.process.screen import complain, drop, secure_streams
+from master.process.signals import breakable
 
 EPILOG = """examples:
   pipelay run                                  the paper's scene, 300 s; results in results/paper
@@ -146,7 +146,8 @@ def program() -> int:
     ended = guarded(lambda: _perform(options))
     if isinstance(ended, int):
         return ended
-    from master import commands, post_mortem
+    from master import commands
+    from master.process import crash as post_mortem
 
     left = post_mortem.bury(commands.run_folder(options), ended) if options.command == "run" else ""
     return complain(f"the process {ended.how}{left}", 1)

@@ -9,21 +9,21 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from master import physics, scene_remarks
-from master import scene as scenes_of
 from master.errors import RunError, UsageError, broken_arithmetic
 from master.fmi.system import EXPORTED, write_system
-from master.folders import SCRATCH, taken, unwritable
-from master.interrupts import postponed
-from master.prepared import prepare
-from master.screen import complain, patience, say, terminal
+from master.process.folders import SCRATCH, taken, unwritable
+from master.process.screen import complain, patience, say, terminal
+from master.process.signals import postponed
+from master.run.prepared import prepare
+from master.scene import physics, reading
+from master.scene import remarks as scene_remarks
 
 
 def run(options: argparse.Namespace) -> int:
     """Simulate a scene; exit code 1 where it did not reach its end or the energy check failed."""
-    scene = scenes_of.load(options.scene, options.changes)
+    scene = reading.load(options.scene, options.changes)
     folder = _folder(run_folder(options))
-    from master.run import simulate  # matplotlib and FMPy take a second to import: not for `scenes` or a bad scene
+    from master.run.simulate import simulate  # matplotlib and FMPy take a second to import: not for `scenes` or a bad scene
 
     result = simulate(scene, folder, terminal())
     say(f"{result.screen}\nresults in {folder}")
@@ -37,8 +37,8 @@ def run_folder(options: argparse.Namespace) -> Path:
 
 def statics(options: argparse.Namespace) -> int:
     """Print the coupled equilibrium of a scene."""
-    scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
-    from master.statics import report  # works with the units' packages, which a run never imports
+    scene = reading.of_pipe(reading.load(options.scene, options.changes))
+    from master.with_units.statics import report  # works with the units' packages, which a run never imports
 
     with patience(terminal()), broken_arithmetic("statics"):
         found = report(scene)
@@ -50,7 +50,7 @@ def statics(options: argparse.Namespace) -> int:
 
 def export(options: argparse.Namespace) -> int:
     """Write the FMUs of a scene, and the files that connect them, into a folder: all or none, instead of those of another export."""
-    scene = scenes_of.of_pipe(scenes_of.load(options.scene, options.changes))
+    scene = reading.of_pipe(reading.load(options.scene, options.changes))
     folder = _folder(options.output)
     with taken(folder):
         try:
@@ -84,17 +84,17 @@ def _moved(files: list[Path], folder: Path) -> list[Path]:
 
 def scenes(options: argparse.Namespace) -> int:
     """List the built-in scenes."""
-    found = scenes_of.built_in()
+    found = reading.built_in()
     width = max(map(len, found))
     for name, title in found.items():
         say(f"{name:{width}}  {title}", result=True)
-    say(f"files in {scenes_of.BUILT_IN}", result=True)
+    say(f"files in {reading.BUILT_IN}", result=True)
     return 0
 
 
 def keys(options: argparse.Namespace) -> int:
     """List what a scene may say."""
-    from master.keys import listing
+    from master.scene.keys import listing
 
     say(listing(), result=True)
     return 0
@@ -102,17 +102,17 @@ def keys(options: argparse.Namespace) -> int:
 
 def stability(options: argparse.Namespace) -> int:
     """Run the stability cases; exit code 1 where a limit is not kept."""
-    return _study(options, "master.stability.study")
+    return _study(options, "master.studies.stability.study")
 
 
 def hard_cases(options: argparse.Namespace) -> int:
     """Run the pipe's hard cases; exit code 1 where a step does not keep the energy identity."""
-    return _study(options, "master.hard_cases")
+    return _study(options, "master.studies.hard_cases")
 
 
 def bench(options: argparse.Namespace) -> int:
     """Measure speed against error; exit code 1 where a limit is not kept."""
-    return _study(options, "master.benchmarks.study")
+    return _study(options, "master.studies.benchmarks.study")
 
 
 def _study(options: argparse.Namespace, module: str) -> int:
@@ -143,7 +143,7 @@ def _folder(path: Path) -> Path:
     return path
 
 
-def _statics_table(scene: scenes_of.Scene, found: dict[str, Any]) -> str:
+def _statics_table(scene: reading.Scene, found: dict[str, Any]) -> str:
     def kilo(key: str) -> str:
         return "  ".join(f"{value / 1e3:10.3f}" for value in found[key])
 

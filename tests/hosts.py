@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from master import scene
 from master.__main__ import main as pipelay
-from master.fmu import Fmu
-from master.monolithic import march
+from master.fmu.instance import Fmu
+from master.scene import reading as scene
+from master.with_units.monolithic import march
 
 PROGRAM = Path(__file__).with_name("run_host.py")
 COSIM = ("libcosimpy==0.0.6",)

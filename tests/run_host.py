@@ -21,10 +21,10 @@ Rows = Iterator[list[float]]
 
 def own(folder: Path, step: float, end: float) -> Rows:
     """The master of this package: energy-consistent, iterated with rollback."""
-    from master.bond import impedance_end, mobility_end
-    from master.coupling import EnergyConsistent
-    from master.fmu import Fmu
-    from master.hang_off import hang_off
+    from master.coupling.bond import impedance_end, mobility_end
+    from master.coupling.energy_consistent import EnergyConsistent
+    from master.coupling.hang_off import hang_off
+    from master.fmu.instance import Fmu
 
     with Fmu(folder / "pipe.fmu", "pipe") as pipe, Fmu(folder / "vessel.fmu", "vessel") as vessel:
         pipe.initialize()

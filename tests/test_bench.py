@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from master.__main__ import main
-from master.benchmarks import (
+from master.errors import RunError
+from master.studies.benchmarks import (
     costs,
     coupled,
     forces,
@@ -21,9 +22,8 @@ from master.benchmarks import (
     statics,
     study,
 )
-from master.benchmarks.histories import LineCase, Setting
-from master.errors import RunError
-from master.hard_cases import swing
+from master.studies.benchmarks.histories import LineCase, Setting
+from master.studies.hard_cases import swing
 from pipe_fmu import Pipe
 
 STEPS = tuple(Setting(line.OWN, 16, h, "adapted", 1) for h in (0.4, 0.2, 0.1))

@@ -14,13 +14,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from master import keys, prepared, run
 from master.__main__ import main
-from master.drive import Effort, pose_gap, top_tension
-from master.fmu import FmuFailed, StepRejected
-from master.ledger import EnergyCheckFailed
-from master.remarks import Remarks
-from master.scene import FOUND, from_mapping, load
+from master.coupling.ledger import EnergyCheckFailed
+from master.fmu.instance import FmuFailed, StepRejected
+from master.run import prepared
+from master.run import simulate as run
+from master.run.drive import Effort, pose_gap, top_tension
+from master.run.warnings import Remarks
+from master.scene import keys
+from master.scene.reading import FOUND, from_mapping, load
 
 
 class Ports:
@@ -298,7 +300,7 @@ def test_an_interruption_that_the_loading_swallows_ends_the_run_after_its_first_
 
 
 def test_the_preparation_bears_that_nobody_reads_its_answer():
-    command = [sys.executable, "-m", "master.prepare"]
+    command = [sys.executable, "-m", "master.with_units.prepare"]
     child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     child.stdout.close()
     child.stdin.write(b'{"pipe": 1}')

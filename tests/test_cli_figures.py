@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from master.figures import bending, configurations, draw_all
-from master.recorder import Shapes, Table
+from master.results.figures import bending, configurations, draw_all
+from master.results.recorder import Shapes, Table
 
 LENGTH, DEPTH, WEIGHT = 1200.0, 800.0, 759.1
 

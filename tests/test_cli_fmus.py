@@ -8,13 +8,15 @@ import zipfile
 import numpy as np
 import pytest
 
-from master import commands, drive, scene
+from master import commands
 from master.__main__ import main
-from master.bond import FmuEnd, mobility_end
-from master.drive import open_drive
-from master.fmu import Fmu, FmuFailed
-from master.ledger import EnergyCheckFailed
-from master.prepared import prepare
+from master.coupling.bond import FmuEnd, mobility_end
+from master.coupling.ledger import EnergyCheckFailed
+from master.fmu.instance import Fmu, FmuFailed
+from master.run import drive
+from master.run.drive import open_drive
+from master.run.prepared import prepare
+from master.scene import reading as scene
 
 EXPORTED = (
     "pipe.fmu", "vessel.fmu", "system.ssp", "OspSystemStructure.xml", "OspSystemStructure_ecco.xml", "Pipe_OspModelDescription.xml",

@@ -8,8 +8,8 @@ import os
 import pytest
 from test_scene_loading import BAD_CHANGES, MINIMAL
 
-from master import statics
 from master.__main__ import main
+from master.with_units import statics
 
 ALONE = MINIMAL.replace("x = 800.0", "x = 800.0\nz = -800.0")  # a whole scene
 DIGITS = 5000

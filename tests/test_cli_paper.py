@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from master import scene
 from master.__main__ import main
-from master.monolithic import march
+from master.scene import reading as scene
+from master.with_units.monolithic import march
 from pipe_fmu import Pipe
 
 

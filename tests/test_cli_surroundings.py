@@ -24,11 +24,12 @@ from test_cli_commands import SHORT, StillDrive, still  # noqa: F401  (a fixture
 from test_coupling_scene import ENERGY, SCENE, begun, columns, failing
 from units.toys import SPRING, build_pair
 
-from master import figures, screen
 from master.__main__ import main
 from master.fmi import build, cache
 from master.fmi.build import build_fmu, cache_folder, cached_fmu
-from master.folders import taken
+from master.process import screen
+from master.process.folders import taken
+from master.results import figures
 
 PROGRAM = (sys.executable, "-P", "-m", "master")
 FULL = "No space left on device"
@@ -121,7 +122,7 @@ def test_modules_of_the_working_folder_shadow_nothing(folder, expected, tmp_path
 def test_modules_of_a_hosts_working_folder_shadow_nothing_in_an_fmu(folder, tmp_path):
     host = """
         import sys
-        from master.fmu import Fmu
+        from master.fmu.instance import Fmu
         sys.path.insert(0, "")
         with Fmu(sys.argv[1]) as fmu:
             fmu.initialize({"offset": [2, 0, 0]})
@@ -210,7 +211,7 @@ class Plain(Fmi2Slave):
 """
 STEPPED = """
 import sys
-from master.fmu import Fmu, FmuFailed
+from master.fmu.instance import Fmu, FmuFailed
 try:
     with Fmu(sys.argv[1]) as fmu:
         fmu.initialize()
@@ -246,7 +247,7 @@ def test_a_second_run_into_a_folder_is_refused_in_one_line(folder, tmp_path):
 
 def test_a_folder_is_free_again_however_its_holder_ended_and_what_it_was_making_goes(tmp_path):
     out = tmp_path / "a" / "out"
-    program = "import os, sys; from master.folders import *; it = Path(sys.argv[1])\n"
+    program = "import os, sys; from master.process.folders import *; it = Path(sys.argv[1])\n"
     program += "with taken(it): (it / '.pipelay-1-x').mkdir(); os._exit(9)"
     assert ran(out, call=(sys.executable, "-c", program)).returncode == 9
     with taken(out):
@@ -295,7 +296,7 @@ sys.exit(program())
 """
 
 
-@pytest.mark.parametrize("module", ["master.command_line", "argparse", "master.guarded", "master.commands", "tomllib"])
+@pytest.mark.parametrize("module", ["master.command_line", "argparse", "master.process.child", "master.commands", "tomllib"])
 def test_ctrl_c_while_the_program_loads_is_one_line(module):
     done = ran("-c", INTERRUPTED.format(module=module), call=(sys.executable,))
     assert (done.returncode, done.stdout, done.stderr) == (1, "", "pipelay: interrupted\n")

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from units.toys import build_pair, tied
 
-from master.bond import Bond, Pair
-from master.coupling import CouplingFailed, OneSided
-from master.drive import open_drive, pose_gap
+from master.coupling.bond import Bond, Pair
+from master.coupling.one_sided import OneSided
+from master.coupling.predicted_end import Foreseen
+from master.coupling.scheme import CouplingFailed
 from master.fmi.build import cache_folder
-from master.foreseen import Foreseen
-from master.prepared import prepare
-from master.scene import load
-from master.stability import bodies, study
+from master.run.drive import open_drive, pose_gap
+from master.run.prepared import prepare
+from master.scene.reading import load
+from master.studies.stability import bodies, study
 
 PUSH = {"start_velocity": [1.0, 0.5, 0.0], "start_rotation": [0.0, 0.2, -0.1]}
 ONE_SIDED = (True, False)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from master import scene
-from master.drive import open_drive, pose_gap
-from master.monolithic import march
-from master.prepared import prepare
+from master.run.drive import open_drive, pose_gap
+from master.run.prepared import prepare
+from master.scene import reading as scene
+from master.with_units.monolithic import march
 
 SMALL = ["pipe.nodes=12", "simulation.recording_step=100", "simulation.snapshots=[]"]
 MOVED = ["environment.current.start=0", "environment.current.ramp=2", "vessel.controller.start=300", "vessel.hang_off=[-20.0, 3.0, 2.0]"]

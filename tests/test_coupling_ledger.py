@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from units.toys import BODY_COLUMNS, SPRING_COLUMNS, build_pair, tied
 
-from master.bond import FmuEnd
-from master.coupling import Step
-from master.fmu import Fmu, FmuFailed
-from master.ledger import Columns, EnergyCheckFailed, Ledger
+from master.coupling.bond import FmuEnd
+from master.coupling.ledger import Columns, EnergyCheckFailed, Ledger
+from master.coupling.scheme import Step
+from master.fmu.instance import Fmu, FmuFailed
 
 PUSH = {"start_velocity": [1.0, 0.5, 0.0]}
 

@@ -10,15 +10,15 @@ from pythonfmu.builder import FmuBuilder
 from units.toys import BODY
 
 from master.__main__ import main
-from master.bond import Bond, Pair
-from master.bonded import open_bonded
+from master.coupling.bond import Bond, Pair
+from master.coupling.mobility_law import MeasuredLaw
 from master.errors import UsageError
 from master.fmi.build import build_fmu
-from master.fmu import Fmu
-from master.mobility_law import MeasuredLaw
-from master.prepared import prepare
-from master.run import simulate
-from master.scene import load
+from master.fmu.instance import Fmu
+from master.run.prepared import prepare
+from master.run.simulate import simulate
+from master.run.two_fmu_drive import open_bonded
+from master.scene.reading import load
 
 SCRIPT = Path(units.__file__).parent / "plain_mass.py"
 SCENE = """

@@ -16,8 +16,8 @@ from units.toys import build_pair
 
 from master.__main__ import main
 from master.fmi.build import Recipe, build_fmu
-from master.stability.coupled import UNITS
-from master.stability.published import LIM
+from master.studies.stability.coupled import UNITS
+from master.studies.stability.published import LIM
 
 SCENE = """
 title = "A spring and a body"

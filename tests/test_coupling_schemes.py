@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from units.toys import build_pair, tied
 
-from master.bond import Bond, Pair, impedance_end, mobility_end
-from master.coupling import CouplingFailed, EnergyConsistent, OneSolve, Step, coupling
-from master.extrapolation import Extrapolation
-from master.fmu import STEP_FAILURES
-from master.hang_off import hang_off
-from master.one_solve import History
+from master.coupling.bond import Bond, Pair, impedance_end, mobility_end
+from master.coupling.choose import coupling
+from master.coupling.energy_consistent import EnergyConsistent
+from master.coupling.hang_off import hang_off
+from master.coupling.linearly_implicit import History, OneSolve
+from master.coupling.predictor import Extrapolation
+from master.coupling.scheme import CouplingFailed, Step
+from master.fmu.instance import STEP_FAILURES
 
 PUSH = {"start_velocity": [1.0, 0.5, 0.0], "start_rotation": [0.0, 0.2, -0.1]}
 

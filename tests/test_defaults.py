@@ -6,13 +6,14 @@ import tomllib
 import numpy as np
 import pytest
 
-from master import keys, physics, scene_remarks
 from master.__main__ import main
-from master.drive import top_tension
 from master.errors import UsageError
-from master.scene import BUILT_IN, DEFAULTS, from_mapping, load
-from master.sections import Simulation, TopMotion
-from master.statics import equilibrium
+from master.run.drive import top_tension
+from master.scene import keys, physics
+from master.scene import remarks as scene_remarks
+from master.scene.reading import BUILT_IN, DEFAULTS, from_mapping, load
+from master.scene.sections import Simulation, TopMotion
+from master.with_units.statics import equilibrium
 from pipe_fmu.slave import PipeUnit
 from vessel_fmu.parameters import Controller
 from vessel_fmu.vessel import Inputs, Vessel

@@ -17,7 +17,7 @@ from master.fmi.build import build_fmu, cache_folder, cached_fmu
 
 PROGRAM = """
 import sys
-from master.fmu import Fmu
+from master.fmu.instance import Fmu
 with Fmu(sys.argv[1]) as fmu:
     fmu.initialize({"compiled": True, "hardening": 1.0, "offset": [2, 0, 0]})
     fmu.step(0.0, 0.1)

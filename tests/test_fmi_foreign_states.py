@@ -17,11 +17,11 @@ import pipe_fmu
 import vessel_fmu
 from master.fmi import schema, state
 from master.fmi.build import Recipe, _sources, build_fmu
-from master.fmu import Fmu
-from master.stability.units.body_fmu.slave import BodyUnit
-from master.stability.units.linear_fmu.slave import MassUnit
-from master.stability.units.linear_fmu.slave import SpringUnit as LinearSpringUnit
-from master.stability.units.manipulator_fmu.slave import ArmUnit, CylinderUnit
+from master.fmu.instance import Fmu
+from master.studies.stability.units.body_fmu.slave import BodyUnit
+from master.studies.stability.units.linear_fmu.slave import MassUnit
+from master.studies.stability.units.linear_fmu.slave import SpringUnit as LinearSpringUnit
+from master.studies.stability.units.manipulator_fmu.slave import ArmUnit, CylinderUnit
 from pipe_fmu.slave import PipeUnit
 from vessel_fmu.slave import VesselUnit
 

@@ -7,7 +7,7 @@ import pytest
 from units.toys import BODY, SPRING, spring_recipe
 
 from master.fmi.build import build_fmu
-from master.fmu import Fmu
+from master.fmu.instance import Fmu
 
 
 @pytest.fixture(scope="module")

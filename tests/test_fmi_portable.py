@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 
 from master.__main__ import main
 from master.fmi import licenses, portable
-from master.fmu import Fmu
+from master.fmu.instance import Fmu
 
 STEP, COUNT = 0.1, 5
 INPUTS = {
@@ -73,7 +73,7 @@ def bare(tmp_path_factory, host):
 
 PROGRAM = """
 import json, sys
-from master.fmu import Fmu
+from master.fmu.instance import Fmu
 path, inputs, outputs, step, count = json.loads(sys.argv[1])
 with Fmu(path) as fmu:
     fmu.initialize()

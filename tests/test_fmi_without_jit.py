@@ -13,7 +13,7 @@ from master.fmi.build import Recipe, build_fmu
 WITHOUT = {"NUMBA_DISABLE_JIT": "1"}
 PROGRAM = """
 import sys
-from master.fmu import Fmu
+from master.fmu.instance import Fmu
 with Fmu(sys.argv[1]) as fmu:
     fmu.initialize(inputs={"force": [1e5, 2e5, 3e5]})
     fmu.step(0.0, 0.1)

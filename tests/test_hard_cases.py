@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from pipe_helpers import balance, heave_case, rotation
 
-from master import hard_cases
 from master.__main__ import main
-from master.hard_cases import NAMES, Case, run, shift, study, swing
+from master.studies import hard_cases
+from master.studies.hard_cases import NAMES, Case, run, shift, study, swing
 from pipe_fmu import Pipe
 
 QUICK = Case("quick", heave_case(nodes=12), swing(2.0, 12.0), 20.0, (0.5, 1.0))

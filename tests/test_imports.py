@@ -20,9 +20,8 @@ FLOORS = {  # of pipe_fmu, from the ground up: a module imports from lower floor
     "pipe": 9, "substeps": 9, "validity": 10,
     "slave": 11,
 }  # fmt: skip
-WITH_UNITS = {  # modules of master that import the two units; no process that runs FMUs imports them
-    "master.statics", "master.monolithic", "master.hard_cases", "master.sections", "master.prepare", "master.keys",
-    "master.benchmarks", "master.stability.study",
+WITH_UNITS = {  # where master imports the two units; no process that runs FMUs imports these
+    "master.with_units", "master.studies", "master.scene.sections", "master.scene.keys",
 }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from pipe_helpers import balance, heave_case, rotation, started
 
 from master.fmi.build import Recipe, build_fmu
 from master.fmi.schema import to_mapping
-from master.hard_cases import cases
+from master.studies.hard_cases import cases
 from pipe_fmu import PipeParameters, PipeUnit, substeps
 from pipe_fmu import __file__ as source
 

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from master import scene, scene_remarks
 from master.__main__ import main
 from master.errors import RunError, UsageError
-from master.remarks import Remarks
-from master.statics import equilibrium, report
+from master.run.warnings import Remarks
+from master.scene import reading as scene
+from master.scene import remarks as scene_remarks
+from master.with_units.statics import equilibrium, report
 from pipe_fmu import Pipe, PipeParameters, Section, validity
 from pipe_fmu.slave import PipeUnit
 from vessel_fmu.parameters import Start, VesselParameters

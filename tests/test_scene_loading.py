@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from master import scene
-from master.scene import SceneError
-from master.sections import Load, TopMotion, mean_load
+from master.scene import reading as scene
+from master.scene.reading import SceneError
+from master.scene.sections import Load, TopMotion, mean_load
 
 MINIMAL = """
 [simulation]

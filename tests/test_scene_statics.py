@@ -8,14 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from master import scene
 from master.__main__ import main
-from master.drive import open_drive
 from master.errors import RunError, UsageError
-from master.monolithic import march
-from master.prepared import prepare
-from master.scene import from_mapping
-from master.statics import equilibrium, released, report
+from master.run.drive import open_drive
+from master.run.prepared import prepare
+from master.scene import reading as scene
+from master.scene.reading import from_mapping
+from master.with_units.monolithic import march
+from master.with_units.statics import equilibrium, released, report
 from vessel_fmu.vessel import Vessel
 
 STEEL = {"outer_diameter": 0.4064, "wall_thickness": 0.025}

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from master import scene
 from master.errors import UsageError
-from master.statics import equilibrium, report
+from master.scene import reading as scene
+from master.with_units.statics import equilibrium, report
 
 BAD_VALUES = {
     "unknown key": ("pipe.section.diameter=0.4", "pipe.section.diameter = 0.4", "unknown key"),

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from master.fmi.build import cache_folder
-from master.stability import bodies, limits, published, study
-from master.stability.units.body_fmu.slave import Body, BodyUnit
-from master.stability.units.linear_fmu.exact import transition
-from master.stability.units.linear_fmu.slave import Mass, MassUnit, Spring, SpringUnit
-from master.stability.units.manipulator_fmu import model
+from master.studies.stability import bodies, limits, published, study
+from master.studies.stability.units.body_fmu.slave import Body, BodyUnit
+from master.studies.stability.units.linear_fmu.exact import transition
+from master.studies.stability.units.linear_fmu.slave import Mass, MassUnit, Spring, SpringUnit
+from master.studies.stability.units.manipulator_fmu import model
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ from llvmlite import binding
 from pythonfmu import FmuBuilder
 
 from ..errors import RunError
-from ..locks import locked
+from ..process.locks import locked
 from . import cache, entry, licenses, loader, portable
 from .cache import cache_folder
 from .document import icon_png, page_html

@@ -3,7 +3,7 @@
 Hosts without rollback exchange values once a step. What suits them is the vessel's velocity at the end of its step, held by
 the pipe over the next one, and the pipe's mean pull, held by the vessel: of first order in the step, and stable for vessels well
 above the mass that moves with the pipe's end (in the paper's scene at 0.05 s at 640 t, not at 190 t). A master that iterates
-connects the vessel's mean velocity instead (`master.bond`).
+connects the vessel's mean velocity instead (`master.coupling.bond`).
 
 The SSP connects the change of the pull from a reference, the pull at rest, which the vessel's unconnected `force` and `moment` have
 for their start values: a host that puts zeros into connected inputs at its start, as FMPy does, then starts right. The OSP's hosts

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from master import stability
-from master.bond import Bond, FmuEnd, end_value_ends, impedance_end, mobility_end
-from master.coupling import Check, EnergyConsistent, Explicit, OneSolve, coupling
+from master.coupling.bond import Bond, FmuEnd, end_value_ends, impedance_end, mobility_end
+from master.coupling.choose import coupling
+from master.coupling.hang_off import hang_off
+from master.coupling.ledger import Action, Columns, Ledger
+from master.coupling.scheme import Check, Scheme
 from master.fmi.build import Recipe, build_fmu
-from master.fmu import Fmu
-from master.hang_off import hang_off
-from master.ledger import Action, Columns, Ledger
+from master.fmu.instance import Fmu
+from master.studies import stability
 
 HERE = Path(__file__).parent
 SPRING = Recipe(HERE / "spring_fmu", "slave.SpringUnit", {}, "Six springs")
@@ -41,7 +42,7 @@ class Pair:
 
     spring: Fmu
     body: Fmu
-    coupling: EnergyConsistent | OneSolve | Explicit
+    coupling: Scheme
     ledger: Ledger
 
     def run(self, step: float, end: float) -> None:

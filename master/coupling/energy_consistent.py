@@ -1,0 +1,229 @@
+"""One step of a power bond by energy-consistent iteration (EC-IJ).
+
+An impedance end answers the mean flow V over a step with the mean effort f, a mobility end answers f with V; each holds
+what it is given. The step is accepted when the bond makes no energy. With F = -f, Z = dF/dV >= 0 and Y = dV/df >= 0:
+
+    V, f     extrapolated from the last accepted steps                                       # no solve
+    V_free = mobility(f) - Y f
+    repeat:  f_v = solve(1 + Z Y, f + Z (V - V_free));  V_new = mobility(f_v);  f_new = impedance(V_new)
+             residual = H (f_v - f_new).V_new                                                # energy made by the bond
+             V, f, V_free = V_new, f_new, V_new - Y f_v
+
+Z and Y follow the ends' ports, where there are such, which makes the iteration Newton's; else Z follows Broyden's update,
+and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap.
+
+An impedance end that can yield (see `master.coupling.bond.FmuEnd.meet`) takes V_free and Y, which that end's `derivative` gives at the
+extrapolated f, and solves for V and f at once, within its own Newton iteration. Where the mobility end answers that f with the same V to
+round-off, as it does where it is nearly linear over the error of the extrapolation, the step is done, with one solve of the impedance end.
+Else V_free and Y are taken anew at the f found, and one more solve, with the V that the mobility end answers, confirms it. Without
+yielding the second round is exact where f is linear in V, and two solves make a step; one does where nothing happens, and more where the
+extrapolation fails.
+
+A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
+few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. No step is halved where
+an FMU takes but one length. A tolerance below the round-off of the ends' answers is met to that round-off: a residual that no longer falls
+is then accepted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..fmu.instance import StepFailed, StepRejected
+from .bond import Bond, Matrix, Vector
+from .predictor import Extrapolation
+from .scheme import SLIVER, Check, Counters, CouplingFailed, End, Step, accept
+
+DIFFERENCES_ROUNDS = (4, 8)  # rounds after which Z is taken by differences: without ports, and with (one may be wrong)
+LAST_ROUND = 12
+FALLING = 0.3  # of the defect of the round before: more is no progress
+ROUND_OFF = 1e-10  # of the product of the magnitudes: without progress below this the ends' own round-off is reached
+SAME, STILL = 1e-12, 1e-8  # of a flow, and of one that counts as rest: what moves no pose by more than its own round-off
+FORESEEN = 0.1  # of the tolerance: a defect this small needs no better effort before it is confirmed
+EASY = 3  # rounds of an easy step
+PATIENCE = 4  # easy steps in a row after which a halved step grows
+SMALLEST_STEP = 2.0**-12  # of the macro step
+
+
+class EnergyConsistent:
+    """EC-IJ. `tolerance` is relative to the energy exchanged in the step; `macro_step` the longest step [s].
+
+    `check` sees a step before it is committed (the ends' outputs are those of its end) and may send it back.
+    """
+
+    def __init__(
+        self, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
+    ) -> None:
+        self.impedance, self.mobility, self.bond = impedance, mobility, bond
+        self.macro_step, self.tolerance, self.check = macro_step, tolerance, check
+        self.wanted = macro_step
+        self._smallest = SMALLEST_STEP * macro_step if impedance.varies and mobility.varies else macro_step
+        self.counters = Counters()
+        self._guess = Extrapolation(mobility.result(), impedance.result(), bond.idle_power)
+        self._one = np.eye(bond.size)
+        self._Z = self._Y = np.empty((0, 0))
+        self._inverse: Matrix | None = None  # Y^-1, once it is asked for
+        self._length = 0.0  # the step they belong to; 0: none
+        self._converged = False
+        self._easy = 0  # steps of the wanted length that took few rounds, in a row
+        self._exchanged = 0.0  # so far [J]
+
+    @property
+    def words(self) -> str:
+        """What is done, for the report."""
+        return "energy-consistent, iterated with rollback"
+
+    def advance(self, time: float, limit: float) -> Step:
+        """One accepted step from `time`, at most to `time` + `limit`.
+
+        Raises CouplingFailed if even the smallest step is rejected, FmuFailed if an FMU breaks down.
+        """
+        step = min(self.wanted, limit)
+        if limit - step < SLIVER * step:
+            step = limit
+        failures = 0
+        while True:
+            residual, reason = float("nan"), "the check sent the step back"
+            self.impedance.begin()
+            self.mobility.begin()
+            try:
+                trial = self._attempt(time, step)
+                if self._converged:
+                    if self.check(trial):
+                        return self._commit(trial)
+                else:
+                    residual = trial.residual
+                    reason = f"bond residual {residual:.3g} J after {trial.rounds} rounds"
+            except StepRejected as rejection:
+                failures += isinstance(rejection, StepFailed)
+                reason = str(rejection)
+            self.impedance.cancel()
+            self.mobility.cancel()
+            self._length = 0.0
+            self.counters.rejected_steps += 1
+            if failures > 1 or step / 2 < self._smallest:
+                reason += "; an FMU takes no other step" if self._smallest == self.macro_step else ""
+                raise CouplingFailed(time, step, residual, reason)
+            step = self.wanted = step / 2
+            self._easy = 0
+
+    def _attempt(self, time: float, step: float) -> Step:
+        flow, effort = self._guess.at(time + step / 2)
+        fresh = abs(step - self._length) > SLIVER * step  # slopes of another step length are of no use
+        free = self.mobility.solve(time, step, effort)
+        mobility = self.mobility.derivative() if fresh or self.impedance.yields else None
+        if mobility is not None:
+            self._set_mobility(mobility)
+        elif fresh:
+            self._set_mobility(self._differences(self.mobility, time, step, effort, free))
+        free = free - self._Y @ effort
+        met, foreseen = self.impedance.meet(time, step, free, self._Y), False
+        if met is not None:
+            flow, effort = met
+            new_flow = self.mobility.solve(time, step, effort)
+            trial = Step(time, step, new_flow, effort, step * float(effort @ (new_flow - flow)), 1)
+            self._converged = not fresh and self._alike(flow, trial)
+            if self._converged:
+                return trial
+            foreseen = not fresh and self._agree(flow, effort, new_flow)
+            if not foreseen and (mobility := self.mobility.derivative()) is not None:
+                self._set_mobility(mobility)
+            free = new_flow - self._Y @ effort
+        elif fresh:
+            effort = self.impedance.solve(time, step, flow)
+        on_law = fresh or met is not None
+        if on_law and not foreseen:
+            slope = self.impedance.derivative()
+            self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
+            self._length = step
+        self._converged, believed, before = False, True, np.inf
+        for rounds in range(1, LAST_ROUND + 1):
+            Z, Y, held = self._Z, self._Y, effort
+            if not (foreseen and rounds == 1):
+                held = np.linalg.solve(self._one + Z @ Y, effort + Z @ (flow - free))
+                new_flow = self.mobility.solve(time, step, held)
+            new_effort = self.impedance.solve(time, step, new_flow)
+            gap = held - new_effort
+            trial = Step(time, step, new_flow, new_effort, step * float(gap @ new_flow), rounds)
+            defect = abs(trial.residual) + step * abs(float(gap @ Y @ gap))
+            if not np.isfinite(defect):
+                break
+            stalled = defect > FALLING * before and defect <= ROUND_OFF * step * float(np.abs(new_effort) @ np.abs(new_flow))
+            self._converged = stalled or defect <= self.tolerance * self._energy_scale(trial)
+            if self._converged:
+                break
+            before = defect
+            slope = self.impedance.derivative() if believed else None
+            if rounds == DIFFERENCES_ROUNDS[slope is not None]:
+                self._Z = -self._differences(self.impedance, time, step, new_flow, new_effort)
+                believed = False
+            elif slope is not None:
+                self._Z = -slope
+            elif on_law:
+                self._broyden(new_flow - flow, effort - new_effort)
+            if (mobility := self.mobility.derivative()) is not None:
+                self._set_mobility(mobility)
+            flow, effort, free, on_law = new_flow, new_effort, new_flow - self._Y @ held, True
+        return trial
+
+    def _alike(self, met: Vector, trial: Step) -> bool:
+        """Whether the flow that the impedance end met is the one that the mobility end answers, to round-off: then the step is done."""
+        apart, size = self.bond.sizes(np.array([met - trial.flow, trial.flow]))
+        agreed = bool((apart <= SAME * size + STILL * self.bond.floors).all())
+        return agreed and abs(trial.residual) <= self.tolerance * self._energy_scale(trial)
+
+    def _agree(self, met: Vector, effort: Vector, answered: Vector) -> bool:
+        """Whether the mobility end answers an effort with the flow that the impedance end met, by the defect to be expected."""
+        gap = self._Z @ (met - answered)
+        defect = abs(float(gap @ answered)) + abs(float(gap @ self._Y @ gap))
+        return defect <= FORESEEN * self.tolerance * abs(float(effort @ answered))
+
+    def _commit(self, trial: Step) -> Step:
+        self.impedance.commit()
+        self.mobility.commit()
+        self._guess.add(trial.time + trial.step / 2, trial.flow, trial.effort)
+        self._exchanged += trial.step * abs(float(trial.effort @ trial.flow))
+        self.counters.steps += 1
+        self.counters.rounds.append(trial.rounds)
+        if trial.step >= self.wanted:
+            self._easy = self._easy + 1 if trial.rounds <= EASY else 0
+            if self._easy >= PATIENCE:
+                self.wanted, self._easy = min(2 * self.wanted, self.macro_step), 0
+        return trial
+
+    def _energy_scale(self, trial: Step) -> float:
+        """What the residual is measured by [J]: energy exchanged, kinetic energy of the moved end, or that of rest.
+
+        The kinetic energy counts up to the mean exchange so far: a heavy end that crosses the pull at speed would
+        otherwise let residuals pass that add up to more than the tolerance of the energy exchanged.
+        """
+        exchanged = trial.step * abs(float(trial.effort @ trial.flow))
+        mean, kinetic = (self._exchanged + exchanged) / (self.counters.steps + 1), 0.0
+        if mean > exchanged:
+            kinetic = trial.step * abs(float(trial.flow @ self._inertia @ trial.flow)) / 4  # Y = H/2 x inverse inertia
+        return max(exchanged, min(kinetic, mean), trial.step * self.bond.idle_power(trial.effort))
+
+    def _differences(self, end: End, time: float, step: float, held: Vector, result: Vector) -> Matrix:
+        """d(result)/d(held) of the step just solved, by forward differences from the saved state."""
+        increments = self.bond.flow_increments() if end is self.impedance else self.bond.effort_increments(held)
+        columns = [(end.solve(time, step, held + d) - result) / d.sum() for d in np.diag(increments)]
+        return np.column_stack(columns)
+
+    def _set_mobility(self, Y: Matrix) -> None:
+        self._Y, self._inverse = Y, None
+
+    @property
+    def _inertia(self) -> Matrix:
+        if self._inverse is None:
+            try:
+                self._inverse = np.linalg.inv(self._Y)
+            except np.linalg.LinAlgError:  # an end that cannot move in some direction has no inertia there
+                self._inverse = np.linalg.pinv(self._Y)
+        return self._inverse
+
+    def _broyden(self, d_flow: Vector, d_force: Vector) -> None:
+        """Least change of Z, measured by the inertia, that explains the last two points."""
+        weighted = self._inertia @ d_flow
+        size = float(d_flow @ weighted)
+        if size > 0.0:
+            self._Z = self._Z + np.outer(d_force - self._Z @ d_flow, weighted) / size

@@ -1,0 +1,1 @@
+"""One FMU in this process: its calls and its ports."""

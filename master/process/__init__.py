@@ -1,0 +1,1 @@
+"""Processes of the program and what they leave: children, signals, crashes, locks, folders, screens."""

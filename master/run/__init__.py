@@ -1,0 +1,1 @@
+"""A run: units opened, stepped, recorded."""
