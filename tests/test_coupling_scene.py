@@ -299,7 +299,7 @@ def test_the_results_of_an_earlier_run_are_not_taken_for_those_of_one_that_dies_
     out = tmp_path / "out"
     ran(folder, out)
     before = (out / "summary.json").read_text()
-    died = "import os, sys, master.bonded; master.bonded.Bonded.__init__ = lambda *_: os._exit(3)"
+    died = "import os, sys; from master.run import two_fmu_drive; two_fmu_drive.Bonded.__init__ = lambda *_: os._exit(3)"
     call = f"{died}; sys.argv[1:] = {command(folder, out, 'crash')[3:]!r}; from master.__main__ import program; sys.exit(program())"
     done = subprocess.run([sys.executable, "-c", call], check=False, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (1, "pipelay: the process was ended from within, with exit code 3\n")

@@ -298,7 +298,8 @@ def test_the_residual_of_a_step_is_that_of_what_the_units_report_whatever_the_sc
             done = pair.coupling.advance(time, 0.1)
             time += done.step
             assert done.residual == pytest.approx(pair.ledger.step_residual, rel=1e-9, abs=1e-15)
-        assert pair.ledger.interface_residual > 1e-9 * pair.ledger.exchanged
+        leaves = way.get("rollback") != (True, False)  # of one side the pipe is solved again, until nothing is left
+        assert (pair.ledger.interface_residual > 1e-9 * pair.ledger.exchanged) == leaves
 
 
 class Failing:

@@ -17,7 +17,6 @@ import c_host
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi1 import FMICallException
 from fmpy.ssp.ssd import read_ssd
 from fmpy.validation import validate_fmu
 from numba import types
@@ -293,8 +292,7 @@ def test_corrections_are_counted_by_a_discrete_integer(exported):
         assert 1 <= count <= 20
         mixed = fmu.get(("pipe_length", "newton_iterations", "newton_residual"))
         np.testing.assert_array_equal(mixed, [fmu.get("pipe_length")[0], count, fmu.get("newton_residual")[0]])
-        with pytest.raises(FMICallException):
-            fmu._fmu.getReal([variable.valueReference])
+        assert fmu._fmu.getReal([variable.valueReference]) == list(fmu.get("newton_iterations"))  # CoFmuPy reads every output so
 
 
 def test_what_it_says_it_can_do_it_can(exported):

@@ -77,7 +77,7 @@ def named():
             yield from ((numbers, *place) for place in re.findall(r"`([\w/]+\.py):(\w+)`", cells[3]))
 
 
-@pytest.mark.parametrize(("numbers", "file", "function"), named())
+@pytest.mark.parametrize(("numbers", "file", "function"), list(named()))
 def test_every_equation_stands_where_the_concordance_says(numbers, file, function):
     text = (ROOT / file).read_text()
     nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == function]

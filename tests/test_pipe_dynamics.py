@@ -143,7 +143,7 @@ def test_added_mass_is_that_of_the_displaced_water_across_and_nothing_along():
     t1 = np.array([frame(q)[:, 0] for q in state.quaternion])
     moving = state._replace(
         velocity=np.tile(v, (16, 1)),
-        flow=np.array([frame(q).T @ v for q in state.quaternion]),
+        added_mass_velocity=np.array([frame(q).T @ v for q in state.quaternion]),
     )
     lengths = np.diff(pipe.s)
     share = 0.5 * (np.append(lengths, 0.0) + np.append(0.0, lengths))

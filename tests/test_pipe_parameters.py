@@ -160,13 +160,13 @@ def test_nodes_placed_by_hand_stay_where_they_are_put():
 
 def test_sections_begin_and_end_at_nodes_and_carry_their_own_properties():
     sections = (replace(P16, length=333.0), replace(P30, length=500.0), replace(P12, length=367.0))
-    pipe = Pipe(PipeParameters(sections=sections))
+    pipe = Pipe(PipeParameters(sections=sections, seabed=Seabed()))
     for joint in (333.0, 833.0):
         assert np.abs(pipe.s - joint).min() < 1e-9
     middle = 0.5 * (pipe.s[1:] + pipe.s[:-1])
     which = np.searchsorted([333.0, 833.0], middle)
     np.testing.assert_allclose(pipe.line.stiffness[:, 0], [sections[k].stiffness[0] for k in which])
-    np.testing.assert_allclose(pipe.line.diameter, [sections[k].outer_diameter for k in which])
+    np.testing.assert_allclose(pipe.line.loads.bed.diameter, [sections[k].outer_diameter for k in which])
     total = sum(one.mass_per_length * one.length for one in sections)
     assert pipe.line.mass.sum() == pytest.approx(total, rel=1e-12)
 

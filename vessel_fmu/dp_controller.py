@@ -108,9 +108,9 @@ def pid(law: Law, reference: Array, integral: Array, pull: Array, pose: Array, v
     along = heading(pose[2])
     offset = reference[0] - pose
     offset[2] = wrap(offset[2])
-    error, rate, acceleration, total, pull = np.array([offset, reference[1] + velocity, reference[2], integral, pull]) @ along
+    error, rate, acceleration, total, pull = np.array([offset, reference[1] - velocity, reference[2], integral, pull]) @ along
     total += dt * law.integral * error
-    wanted = law.stiffness * error + law.damping * rate + law.mass * acceleration + total + pull
+    wanted = law.stiffness * error + law.damping * rate + law.mass * acceleration + total - pull
     thrust = np.maximum(np.minimum(wanted, law.limit), -law.limit)
     total += (1.0 - math.exp(-dt / law.tracking_time)) * (thrust - wanted)  # back-calculation against windup
     return along @ total, along @ thrust

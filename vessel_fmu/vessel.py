@@ -176,4 +176,4 @@ class Vessel:
         down = rotation[2]
         add_restoring(self.hull.stiffness, self.hull.flotation, position[2] + self.depth, down, down, np.zeros(6), 0.0, load)
         x, y, yaw = self.parameters.hold_force
-        return [x, -y, 0.0] - rotation @ load[:3], [0.0, 0.0, yaw] - rotation @ load[3:]
+        return [x, y, 0.0] - rotation @ load[:3], [0.0, 0.0, yaw] - rotation @ load[3:]

@@ -69,12 +69,15 @@ class Ports:
         return values
 
     def place(self, reference: int, kind: str = "Real") -> tuple[str, str, int]:
-        """(causality, name, index in the port) of a value reference. Raises ValueError if there is none of that kind."""
+        """(causality, name, index in the port) of a value reference. Raises ValueError if there is none of that kind.
+
+        A count is given as a real number too, as hosts that read every output as such (CoFmuPy) ask for it.
+        """
         if not 0 <= reference < len(self._places):
             raise ValueError(f"value reference = {reference}: must be below {len(self._places)}")
         causality, name, _ = place = self._places[reference]
         own = self.parameters[name].kind if causality == "parameter" else "Integer" if name in self.counts else "Real"
-        if kind != ("Integer" if own == "Enumeration" else own):
+        if kind != ("Integer" if own == "Enumeration" else own) and not (causality == "output" and kind == "Real"):
             raise ValueError(f"{name}: asked for as {kind}, is {own}")
         return place
 
