@@ -128,6 +128,16 @@ def test_each_dissipation_is_there_when_named_and_only_then():
             assert (works[kind] > 0.0) == (kind == extra)
 
 
+def test_rotational_damping_takes_from_the_energy_what_its_moment_brakes():
+    """So strong that it takes a good share of what goes through the top: an error of its moment against its work would show."""
+    pipe, _, start = started(scene("current", section=replace(P16, rotational_damping=(3e6, 2e6, 4e6))))
+    states, _ = march(pipe, start, sway, 0.1, 20)
+    for old, new in pairwise(states):
+        assert keeps_the_energy_identity(pipe, old, new)
+    lost = dict(zip(WORKS, states[-1].works - start.works, strict=True))
+    assert lost["rotational"] > 0.01 * lost["drag"]
+
+
 def test_bed_friction_and_bed_damping_each_dissipate():
     lost = []
     for bed in (Seabed(damping=0.0, friction=0.0), Seabed(damping=1.0, friction=0.0), Seabed(damping=0.0, friction=0.5)):
