@@ -205,6 +205,23 @@ def test_gains_are_those_of_the_pole_placement():
     assert_allclose(law.mass, np.diag(mass_matrix(PAPER))[[0, 1, 5]])
 
 
+def test_a_reference_that_accelerates_is_fed_forward_by_the_mass():
+    law, zero, acceleration = control_law(PAPER), np.zeros(3), np.array([1e-2, 2e-2, 1e-5])
+    _, thrust = pid(law, np.array([zero, zero, acceleration]), zero, zero, zero, zero, 0.5)
+    assert_allclose(thrust, law.mass * acceleration, rtol=1e-12)
+
+
+def test_the_current_over_a_step_is_that_of_its_middle():
+    ramp = Current(velocity=(0.0, 0.8, 0.0), ramp=20.0)
+    still = replace(ramp, ramp=0.0, velocity=(0.0, 0.8 * ramp.time_factor(2.0), 0.0))
+    moved = []
+    for current in (ramp, still):
+        vessel = Vessel(replace(PAPER, controller=None, environment=Environment(current=current)))
+        moved.append(vessel.step(vessel.start(), 1.0, 2.0, Inputs()).state.body_velocity)
+    assert_allclose(*moved, rtol=1e-12, atol=1e-15)
+    assert abs(moved[0][1]) > 1e-4
+
+
 def test_a_sample_is_not_due_before_the_start():
     law, state = control_law(PAPER), initial_control(np.zeros(3), np.zeros(3))
     assert due_sample(law, state, 29.9) is None

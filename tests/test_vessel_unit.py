@@ -55,6 +55,16 @@ def unit(**changes):
     return vessel
 
 
+def test_a_hold_thrust_for_good_supplies_nothing():
+    """A constant force: what it gives on a way it takes back on the way back."""
+    vessel = unit(hold_force=(3e5, 1e5, 0.0), start=Start(velocity=(1.0, 0.5, 0.0)))
+    for k in range(10):
+        assert vessel.step(0.5 * k, 0.5, INPUTS) is None
+    given = 3e5 * (vessel.state[0].position[0]) + 1e5 * vessel.state[0].position[1]
+    assert abs(given) > 1e6
+    assert abs(vessel.output("control_work")[0]) < 1e-9 * abs(given)
+
+
 def test_every_port_has_its_declared_size_before_and_after_a_step():
     vessel = unit()
     for _ in range(2):
