@@ -171,3 +171,12 @@ def test_current_reverses_and_ramps_as_named():
     sea = Environment(current=Current(velocity=(0.0, 0.8, 0.0), profile="uniform", start=10.0, ramp=4.0, period=50.0))
     body = unit(environment=sea).vessel
     assert_allclose([body.surface_current(t)[1] for t in (9.9, 12.0, 20.0, 61.0, 111.0)], (0.0, 0.4, 0.8, -0.8, 0.8))
+
+
+def test_the_static_load_of_a_hold_on_even_keel_is_the_hold():
+    vessel = unit(hold_force=(1e5, 2e5, 3e6), start=Start()).vessel
+    state = vessel.start()
+    x, y, _ = vessel.position(state)
+    force, moment = vessel.static_load(np.array([x, y, -vessel.depth]), state.quaternion)
+    assert_allclose(force, [1e5, 2e5, 0.0], rtol=1e-12)
+    assert_allclose(moment, [0.0, 0.0, 3e6], rtol=1e-12)
