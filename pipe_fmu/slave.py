@@ -10,15 +10,13 @@ from .arrays import Array
 from .model import resolve
 from .parameters import PipeParameters
 from .pipe import Pipe
-from .step.state import LEDGER
+from .step.state import ENERGIES, LEDGER, WORK_PORTS
 
 Port = tuple[int, str | tuple[str, ...], str]
 
 _MOTION = "of the hang-off point, mean over the coming step, in e"
 UNSTABLE = "statics: the equilibrium is not stable; the line will leave it at the least push"
 _PULL = "of the pipe on the vessel at the hang-off point, in e"
-_ENERGIES = tuple(port for port in LEDGER if port.endswith("_energy"))
-_WORKS = tuple(port for port in LEDGER if port not in _ENERGIES)
 _MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) + 3 * ("rad/(N.m.s)",))
 _IMPEDANCE = 3 * (3 * ("N.s/m",) + 3 * ("N.s/rad",)) + 3 * (3 * ("N.s",) + 3 * ("N.m.s/rad",))
 _AT_LEAST_ZERO = (
@@ -76,7 +74,7 @@ class PipeUnit:
         absent = [port for port, present in _optional(parameters).items() if not present]
         booked: dict[str, Port] = {port: (1, "J", text) for port, (text, _) in LEDGER.items() if port not in absent}
         top_work: Port = (1, "J", "work done on the pipe at its top since the start")
-        energies = {port: booked.pop(port) for port in _ENERGIES if port in booked}
+        energies = {port: booked.pop(port) for port in ENERGIES if port in booked}
         ports |= energies | {"top_work": top_work} | booked
         ports |= {
             "pipe_length": (1, "m", "length of the stretched centreline"),
@@ -179,11 +177,11 @@ class PipeUnit:
         elif name == "impedance":
             memo[name] = np.ravel(impedance)
         elif name.endswith("_energy"):
-            memo |= {port: np.array([value]) for port, value in zip(_ENERGIES, self._pipe.energies(state), strict=True)}
+            memo |= {port: np.array([value]) for port, value in zip(ENERGIES, self._pipe.energies(state), strict=True)}
         elif name == "top_work":
             memo[name] = np.array([state.top_work])
-        elif name in _WORKS:
-            memo |= {port: state.works[i : i + 1] for i, port in enumerate(_WORKS)}
+        elif name in WORK_PORTS:
+            memo |= {port: state.works[i : i + 1] for i, port in enumerate(WORK_PORTS)}
         elif name == "pipe_length":
             memo[name] = np.array([self._pipe.stretched_length(state)])
         elif name == "newton_iterations":

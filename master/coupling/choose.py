@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from .bond import Bond
 from .energy_consistent import EnergyConsistent
@@ -20,18 +21,16 @@ def _energy_consistent(impedance: End, mobility: End, bond: Bond, macro_step: fl
     return (OneSided if one_sided else EnergyConsistent)(impedance, mobility, bond, macro_step, tolerance, check)
 
 
-def _serial(impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float, check: Check) -> Scheme:
-    return Explicit(impedance, mobility, bond, macro_step, True, check)
-
-
-def _parallel(impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float, check: Check) -> Scheme:
-    return Explicit(impedance, mobility, bond, macro_step, False, check)
+def _explicit(
+    impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float, check: Check, *, serial: bool
+) -> Scheme:
+    return Explicit(impedance, mobility, bond, macro_step, serial, check)
 
 
 SCHEMES: dict[str, Callable[[End, End, Bond, float, float, Check], Scheme]] = {
     "energy-consistent": _energy_consistent,
-    "serial": _serial,
-    "parallel": _parallel,
+    "serial": partial(_explicit, serial=True),
+    "parallel": partial(_explicit, serial=False),
 }
 
 

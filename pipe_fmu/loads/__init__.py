@@ -8,7 +8,7 @@ the modules' `LEDGER`. Every function takes what all loads may need, and calls t
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ..arrays import Array
+from ..arrays import Array, distinct
 from ..compiled import inner, kernel
 from ..element.assembly import expand
 from ..element.strains import STRAINS
@@ -25,6 +25,7 @@ CURRENT, DRAG, CONTACT = (_WORKS.index(port) for port in ("current_work", "drag_
 NO_ENERGY = (0.0, 0.0)  # potentials, in the order of the ledger
 
 
+@distinct
 class Loads(NamedTuple):
     """What the loads need to know of every element."""
 
@@ -32,9 +33,6 @@ class Loads(NamedTuple):
     drag: Array  # (n-1, 2) rho d D_1 / 2, rho d D_2 / 2 [N s^2/m^3], eq. (29)
     bed: Bed
 
-
-# numba knows a type within a tuple by its name: loads of another package in the process (an FMU brings its own) must not pass for these
-Loads.__name__ = f"{__package__}.{Loads.__name__}"
 
 
 def present(parameters: Any) -> dict[str, bool]:
@@ -130,9 +128,11 @@ def add_mean_loads(line, water, first, count, step, middle, ends, gradients, wan
 
 @inner
 def press_sag(loads, e, h, z1, z2, sag, points):
-    """Derivative with respect to the sag [N] of the loads at rest; the bed's reaction into `points` (4, 2), for `add_static_loads`."""
-    even = even_on_sag(loads, e, h)
-    return even + bed.press(loads.bed, e, h, z1, z2, sag, points) if bed.present(loads.bed) else even
+    """Potentials [J] of the loads at rest, as `potentials`, and their sum's derivative with respect to the sag [N]; the bed's reaction goes
+    into `points` (4, 2), for `add_static_loads`.
+    """
+    pressed, on_sag = bed.press(loads.bed, e, h, z1, z2, sag, points) if bed.present(loads.bed) else (0.0, 0.0)
+    return (weight.potential(h * loads.weight[e], z1, z2, sag), pressed), even_on_sag(loads, e, h) + on_sag
 
 
 @inner
@@ -170,7 +170,7 @@ def add_instant_loads(line, water, first, count, arc, position, sags, ends, sag_
     if bed.present(loads.bed):
         for m in range(count):
             e, ours = first + m, lane(vector, m)
-            on_sag = bed.press(loads.bed, e, line.length[e], z[e], z[e + 1], sags[e], lane(points, m))
+            _, on_sag = bed.press(loads.bed, e, line.length[e], z[e], z[e + 1], sags[e], lane(points, m))
             bed.add_press(lane(points, m), ours)
             expand(lane(sag_row, m), lane(by_sag, m))
             for i in range(12):

@@ -15,11 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, distinct
 from ..checks import check_fields, number
 from ..compiled import inner, kernel
 from ..element.assembly import add_outer, expand
 from ..simd.columns import column
+from .points import depth
 
 LEDGER: dict[str, tuple[str, float | None]] = {
     "contact_energy": ("potential energy of the bed", 0.0),
@@ -44,6 +45,7 @@ class Seabed:
         check_fields(self)
 
 
+@distinct
 class Bed(NamedTuple):
     """The bed under every element; without entries where there is none."""
 
@@ -53,9 +55,6 @@ class Bed(NamedTuple):
     friction: float  # [-]
     friction_speed: float  # [m/s]
 
-
-# numba knows a type within a tuple by its name: a bed of another package in the process (an FMU brings its own) must not pass for this
-Bed.__name__ = f"{__package__}.{Bed.__name__}"
 
 
 def bed_of(seabed: Seabed | None, bearing: Array, diameter: Array) -> Bed:
@@ -130,8 +129,7 @@ def mean_on_sag(bed, e, h, dt, old, new):
     for k in range(4):
         x = POINTS[k]
         y = 1.0 - x
-        z_old = y * old[0] + x * old[1] + x * y * old[2]
-        z_new = y * new[0] + x * new[1] + x * y * new[2]
+        z_old, z_new = depth(x, old[0], old[1], old[2]), depth(x, new[0], new[1], new[2])
         force, _ = mean_contact(z_old, z_new, diameter, weight)
         total += h * _WEIGHTS[k] * x * y * force * max(0.0, 1.0 + damping * (z_new - z_old) / dt)
     return total
@@ -141,18 +139,18 @@ def mean_on_sag(bed, e, h, dt, old, new):
 def press(bed, e, h, z1, z2, sag, points):
     """Static reaction of the bed on element e: upward force [N] and stiffness [N/m] of its points into `points` (4, 2).
 
-    Returns the derivative of the potential with respect to the sag [N].
+    Returns (potential [J], its derivative with respect to the sag [N]).
     """
     diameter, weight = bed.diameter[e], bed.bearing[e]
-    on_sag = 0.0
+    potential, on_sag = 0.0, 0.0
     for k in range(4):
         x = POINTS[k]
-        y = 1.0 - x
-        _, force, stiffness = contact(y * z1 + x * z2 + x * y * sag, diameter, weight)
+        u, force, stiffness = contact(depth(x, z1, z2, sag), diameter, weight)
         share = h * _WEIGHTS[k]
         points[k, 0], points[k, 1] = share * force, share * stiffness
-        on_sag += x * y * share * force
-    return on_sag
+        potential += share * u
+        on_sag += x * (1.0 - x) * share * force
+    return potential, on_sag
 
 
 @inner
@@ -197,8 +195,7 @@ def add_mean_contact(bed, e, h, dt, old, new, ends, mean_row, new_row, with_tang
     for k in range(4):
         x = POINTS[k]
         y = 1.0 - x
-        z_old = y * old[0] + x * old[1] + x * y * old[2]
-        z_new = y * new[0] + x * new[1] + x * y * new[2]
+        z_old, z_new = depth(x, old[0], old[1], old[2]), depth(x, new[0], new[1], new[2])
         force, slope = mean_contact(z_old, z_new, diameter, weight)
         if force == 0.0 and slope == 0.0:
             continue
@@ -265,6 +262,5 @@ def potential(bed, e, h, z1, z2, sag):
     """Potential [J] of element e on the bed."""
     total = 0.0
     for k in range(4):
-        x = POINTS[k]
-        total += h * _WEIGHTS[k] * contact((1.0 - x) * z1 + x * z2 + x * (1.0 - x) * sag, bed.diameter[e], bed.bearing[e])[0]
+        total += h * _WEIGHTS[k] * contact(depth(POINTS[k], z1, z2, sag), bed.diameter[e], bed.bearing[e])[0]
     return total

@@ -13,7 +13,7 @@ from ..compiled import inner
 from ..maths.relative_rotation import mid_spin, relative_turn
 from ..maths.so3 import add, apply, cross, dot, scale, subtract
 from .current import current_at, current_slope
-from .points import add_linked, linked_forces, linked_motion, sag_rate
+from .points import add_linked, depth, linked_forces, linked_motion, sag_rate
 
 LEDGER: dict[str, tuple[str, float | None]] = {
     "current_work": ("work done on the pipe by the current since the start", None),
@@ -85,7 +85,7 @@ def add_mean_drag(rm, u, psi, h, coefficients, ends, depths, levels, velocities,
         v = add(add(scale(y, v1), scale(x, v2)), scale(linked, swing))
         v_c = (0.0 * h, 0.0 * h, 0.0 * h)
         if levels.shape[0] > 0:
-            v_c = current_at(y * depths[0] + x * depths[1] + linked * sag, levels, velocities)
+            v_c = current_at(depth(x, depths[0], depths[1], sag), levels, velocities)
         v_r = subtract(v, v_c)  # eq. (31)
         force, a, b, c, v_n = drag(v_r, tangent, coefficients[0], coefficients[1])
         force = scale(0.5 * h, force)
@@ -133,7 +133,7 @@ def add_static_drag(rm, u, psi, h, coefficients, z1, z2, levels, velocities, vec
     bow = (dot(rm[0], psi), dot(rm[1], psi), dot(rm[2], psi))
     sag = 0.5 * (d[0] * bow[1] - d[1] * bow[0])
     for x in POINTS:
-        z = (1.0 - x) * z1 + x * z2 + x * (1.0 - x) * sag
+        z = depth(x, z1, z2, sag)
         v = scale(-1.0, current_at(z, levels, velocities))  # eq. (31)
         tangent, length = _tangent_to_arc(axis, bow, x)
         force, a, b, c, v_n = drag(v, tangent, coefficients[0], coefficients[1])

@@ -11,6 +11,13 @@ from ..maths.so3 import add, cross, scale
 
 
 @inner
+def depth(x, z1, z2, sag):
+    """Depth coordinate z [m] of the point at x, from those of the nodes and the sag of the arc."""
+    y = 1.0 - x
+    return y * z1 + x * z2 + x * y * sag
+
+
+@inner
 def sag_rate(d, bow, v1, v2, w1, w2):
     """Rate of c = d x psi / 2 [m/s], e; `bow` is psi in e."""
     mean = scale(0.5, add(w1, w2))

@@ -6,7 +6,7 @@ from ..compiled import kernel
 from ..element.assembly import add_matrix, add_vector, clear, expand, expand_matrix
 from ..element.geometric_stiffness import geometric_stiffness
 from ..element.strains import ROWS, STRAINS, frame, gradients, strains
-from ..loads import NO_ENERGY, add_static_loads, potentials, press_sag, summed
+from ..loads import NO_ENERGY, add_static_loads, press_sag, summed
 from ..simd.columns import attitude, chord
 
 
@@ -42,8 +42,8 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
             stress[k] = h * line.stiffness[e, k] * strain[k]
             elastic += 0.5 * stress[k] * strain[k]
         z1, z2 = position[e, 2], position[e + 1, 2]
-        stored = summed(stored, potentials(line.loads, e, h, z1, z2, strain[STRAINS]))
-        stress[STRAINS] = press_sag(line.loads, e, h, z1, z2, strain[STRAINS], points)
+        gained, stress[STRAINS] = press_sag(line.loads, e, h, z1, z2, strain[STRAINS], points)
+        stored = summed(stored, gained)
         nine[:] = 0.0
         for k in range(ROWS):
             for i in range(9):

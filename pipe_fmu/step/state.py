@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from .. import loads
-from ..arrays import Array
+from ..arrays import Array, distinct
 
 LEDGER = {  # ports of energies and works: what they are, and the least they can be
     "kinetic_energy": ("kinetic energy", 0.0),
@@ -13,11 +13,13 @@ LEDGER = {  # ports of energies and works: what they are, and the least they can
     "internal_dissipation": ("energy dissipated by internal damping since the start", 0.0),
     "numerical_dissipation": ("energy dissipated by numerical damping since the start", 0.0),
 }
-ENERGIES = tuple(port.removesuffix("_energy") for port in LEDGER if port.endswith("_energy"))
-WORKS = tuple(port.rpartition("_")[0] for port in LEDGER if not port.endswith("_energy"))
+ENERGIES = tuple(port for port in LEDGER if port.endswith("_energy"))
+WORK_PORTS = tuple(port for port in LEDGER if port not in ENERGIES)
+WORKS = tuple(port.rpartition("_")[0] for port in WORK_PORTS)
 ROTATIONAL, INTERNAL, NUMERICAL = (WORKS.index(name) for name in ("rotational", "internal", "numerical"))
 
 
+@distinct
 class PipeState(NamedTuple):
     """Everything that decides the next step; never changed once made."""
 
@@ -33,7 +35,3 @@ class PipeState(NamedTuple):
     earlier: Array  # (n, 6) and of the one before that
     top_work: float  # work done on the pipe at its top since the start [J]
     works: Array  # (len(WORKS),) works and dissipations since the start [J], in their order
-
-
-# numba knows a type within a tuple by its name: a pipe of another package in the process (an FMU brings its own) must not pass for this
-PipeState.__name__ = f"{__package__}.{PipeState.__name__}"
