@@ -10,6 +10,15 @@ from typing import Literal
 from .checks import check_fields, number
 
 
+def time_factor(time: float, start: float, ramp: float, period: float) -> float:
+    """Factor at `time` on a current that sets in at `start` over a `ramp` and reverses after every `period` (0: never), all in s."""
+    since = time - start
+    if since < 0.0:
+        return 0.0
+    factor = 0.5 * (1.0 - math.cos(math.pi * since / ramp)) if since < ramp else 1.0
+    return -factor if period > 0.0 and math.floor(since / period) % 2 == 1 else factor
+
+
 @dataclass(frozen=True)
 class Current:
     """Current of one heading; `velocity` at the surface times a factor of depth times a factor of time."""
@@ -35,11 +44,7 @@ class Current:
 
     def time_factor(self, time: float) -> float:
         """Factor of time: 0 before `start`, then the ramp, with the sign of the period."""
-        since = time - self.start
-        if since < 0.0:
-            return 0.0
-        factor = 0.5 * (1.0 - math.cos(math.pi * since / self.ramp)) if since < self.ramp else 1.0
-        return -factor if self.period > 0.0 and math.floor(since / self.period) % 2 else factor
+        return time_factor(time, self.start, self.ramp, self.period)
 
     def shape(self, depth: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Depths below the surface [m] and factors of the profile in water of `depth` [m]; linear between, constant beyond."""

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from .arrays import Array
 from .compiled import kernel
+from .environment import time_factor
 from .loads import Loads, loads_columns
 from .simd.columns import column, columns
 
@@ -32,6 +33,28 @@ class Water(NamedTuple):
     levels: Array  # (k,) ascending depth coordinate z [m]
     velocities: Array  # (k, 3) [m/s]; k = 0 means still water
     drag: bool
+
+
+class Sea(NamedTuple):
+    """The current over time: its profile at full strength, and the times of `environment.time_factor` [s]."""
+
+    levels: Array  # (k,) ascending depth coordinate z [m]; k = 0 means still water
+    velocities: Array  # (k, 3) [m/s]
+    start: float
+    ramp: float
+    period: float
+    drag: bool
+
+
+_factor = kernel(time_factor)
+
+
+@kernel
+def water_at(sea, time):
+    """The water of a sea at `time` [s]."""
+    factor = _factor(time, sea.start, sea.ramp, sea.period) if sea.levels.shape[0] > 0 else 0.0
+    count = sea.levels.shape[0] if factor != 0.0 else 0
+    return Water(sea.levels[:count], factor * sea.velocities[:count], sea.drag)
 
 
 def shear_stiffness(shear: Array, bending: Array, length: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 from . import mesh
 from .arrays import Array
 from .element.strains import ROWS
-from .line import Line, Water, shear_stiffness
+from .line import Line, Sea, shear_stiffness, water_at
 from .loads import loads_of
 from .parameters import PipeParameters, Section
 from .results import section_forces
@@ -85,7 +85,7 @@ def _stiffest(parameters: PipeParameters) -> float:
 
 def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
     """Nodal section forces (n, 6), material components, of the equilibrium on nodes `s` (n,), if there is one."""
-    line, calm = _line(parameters, s), water(parameters, 0.0)
+    line, calm = _line(parameters, s), water_at(sea(parameters), 0.0)
     attitude = np.array(parameters.top_quaternion)
     found = solve(line, s, calm, parameters.top_position, attitude if attitude.any() else None)
     if not found.converged:
@@ -161,27 +161,17 @@ def mass_per_length(parameters: PipeParameters, s: Array) -> section_forces.Mass
     return section_forces.MassPerLength(along, along + added * section(lambda one: one.outer_area))
 
 
-def water(parameters: PipeParameters, time: float) -> Water:
-    """The water at `time` [s]."""
-    return waters(parameters)(time)
-
-
-def waters(parameters: PipeParameters) -> Callable[[float], Water]:
-    """The water as a function of time [s]."""
+def sea(parameters: PipeParameters) -> Sea:
+    """The current over time."""
     environment = parameters.environment
     sticks = any(section.drag_normal > 0.0 or section.drag_tangential > 0.0 for section in parameters.all_sections)
-    current, still = environment.current, Water(np.zeros(0), np.zeros((0, 3)), sticks)
+    current = environment.current
     if current is None:
-        return lambda time: still
+        return Sea(np.zeros(0), np.zeros((0, 3)), 0.0, 0.0, 0.0, sticks)
     depths, factors = current.shape(environment.depth)
     levels = np.array(depths) - environment.depth  # from the surface down, so ascending in z
-    flow = np.outer(factors, current.velocity)
-
-    def at(time: float) -> Water:
-        factor = current.time_factor(time)
-        return Water(levels, factor * flow, sticks) if factor != 0.0 else still
-
-    return at
+    times = float(current.start), float(current.ramp), float(current.period)
+    return Sea(levels, np.outer(factors, current.velocity), *times, sticks)
 
 
 def estimate_tension(parameters: PipeParameters) -> tuple[float, float]:

@@ -4,6 +4,7 @@ import numpy as np
 
 from . import model
 from .arrays import Array
+from .line import Water, water_at
 from .maths.so3 import matrix
 from .parameters import PipeParameters
 from .results import section_forces, wall_stress
@@ -22,10 +23,15 @@ class Pipe:
     def __init__(self, parameters: PipeParameters) -> None:
         self.parameters = model.resolve(parameters)
         self.s, self.line = model.discretize(self.parameters)
-        self.water = model.waters(self.parameters)
+        self.sea = model.sea(self.parameters)
         self.mass = model.mass_per_length(self.parameters, self.s)
         self.walls = wall_stress.walls(parameters, self.s)
         self.element_walls = wall_stress.element_walls(parameters, self.s)
+
+    def water(self, time: float) -> Water:
+        """The water at `time` [s]."""
+        water: Water = water_at(self.sea, time)
+        return water
 
     def equilibrium(self, top: tuple[float, float, float], attitude: Array | None, time: float = 0.0) -> Equilibrium:
         """Static equilibrium with the top at `top` (3,) [m], e, its section at `attitude` (4,), or as it hangs if None."""
@@ -55,7 +61,8 @@ class Pipe:
 
     def energies(self, state: PipeState) -> tuple[float, ...]:
         """Energies [J], in the order of state.ENERGIES."""
-        return integrator.energy_of(self.line, state)
+        energies: tuple[float, ...] = integrator.energy_of(self.line, state)
+        return energies
 
     def section_forces(self, state: PipeState) -> SectionForces:
         """Section forces at the nodes, material components, without those of numerical damping."""
@@ -90,4 +97,4 @@ class Pipe:
 
     def stretched_length(self, state: PipeState) -> float:
         """Length of the centreline [m], the paper's s_h of Fig. 4."""
-        return section_forces.centreline_length(self.line.length, state.strain)
+        return float(section_forces.centreline_length(self.line.length, state.strain))

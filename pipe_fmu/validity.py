@@ -14,6 +14,7 @@ import numpy as np
 from .arrays import Array
 from .checks import unusual
 from .compiled import kernel
+from .notes import SIZE, WARNING, note, texts
 from .parameters import MOST_STRETCH, PipeParameters, Section
 from .pipe import Pipe
 from .step.state import PipeState
@@ -23,6 +24,14 @@ STEEL_STRAIN, STEEL_MODULUS = 0.005, 150e9  # strain a steel wall may have witho
 SURFACE, SLACK = 0.01, 1e-3  # of the depth, of the largest tension
 NO_STRAIN = 1e-7  # of EA: no more tension than this is none
 WORSE = 1.5  # times what was said last is said again
+WORDS = (
+    "the line hangs %.2g m below the sea floor at S = %.4g m, as there is no bed",
+    "the line rises %.2g m above the surface at S = %.4g m, where it keeps weight and drag of the water",
+    "the line is in compression at S = %.4g m: effective tension %.3g kN",
+    "the line is strained by %.2g %% at S = %.4g m, beyond what any pipe steel bears elastically",
+    "the line is strained by %.2g %% at S = %.4g m, beyond the law of small strains",
+    "past yield: the largest stress is %.3g of the yield stress",
+)
 HEAVIEST, DENSITIES = 5e4, (50.0, 2e4)  # N/m, kg/m3: submerged weights and mean densities beyond are those of no line
 
 
@@ -59,28 +68,40 @@ def _bearable(section: Section) -> float:
     return MOST_STRETCH if section.wall_thickness is None or section.youngs_modulus < STEEL_MODULUS else STEEL_STRAIN
 
 
-def look(pipe: Pipe, bounds: Limits, state: PipeState, utilisation: float, told: Array) -> tuple[list[str], Array]:
-    """One line on each kind that is beyond its limit and half as bad again as `told` (5,), and `told` with them.
+def remarks(pipe: Pipe, state: PipeState, utilisation: float) -> list[str]:
+    """One line on each kind that is beyond its limit in a state."""
+    notes = np.zeros(SIZE)
+    look(pipe.s, pipe.line.stiffness, limits(pipe), state.position, state.strain, utilisation, QUIET.copy(), 0, notes)
+    return texts(notes, WORDS)
 
-    `utilisation` is that of the yield stress in this state, 0 where there is none.
+
+@kernel
+def look(s, stiffness, bounds, position, strain, utilisation, told, first, notes):
+    """Note each kind that is beyond its limit and half as bad again as `told` (5,), and remember it there.
+
+    s (n,): arc lengths of the nodes; stiffness (n - 1, 6); `utilisation` is that of the yield stress, 0 where there is none; `first`: number
+    of the template of the first kind.
     """
-    beyond, value, place = np.empty((3, 5))
+    beyond, value, place = np.empty(5), np.empty(5), np.zeros(5)
     beyond[4] = value[4] = utilisation
-    if not _measure(state.position, state.strain, pipe.line.stiffness, bounds, told, beyond, value, place):
-        return [], told
-    new = beyond > np.maximum(1.0, WORSE * told)
-    (deepest, above, least, strained, _), place = value.tolist(), place[:4].astype(int)
-    s, middle = pipe.s[place], 0.5 * (pipe.s[place] + pipe.s[np.minimum(place + 1, len(pipe.s) - 1)])
-    bearable = float(bounds.bearable[place[3]])
-    over = "what any pipe steel bears elastically" if bearable == STEEL_STRAIN else "the law of small strains"
-    words = (
-        f"the line hangs {deepest:.2g} m below the sea floor at S = {s[0]:.4g} m, as there is no bed",
-        f"the line rises {above:.2g} m above the surface at S = {s[1]:.4g} m, where it keeps weight and drag of the water",
-        f"the line is in compression at S = {middle[2]:.4g} m: effective tension {least / 1e3:.3g} kN",
-        f"the line is strained by {100.0 * strained * bearable:.2g} % at S = {middle[3]:.4g} m, beyond {over}",
-        f"past yield: the largest stress is {utilisation:.3g} of the yield stress",
-    )
-    return [text for text, is_new in zip(words, new, strict=True) if is_new], np.where(new, beyond, told)
+    if not _measure(position, strain, stiffness, bounds, told, beyond, value, place):
+        return
+    worst = int(place[3])
+    bearable = bounds.bearable[worst]
+    for k in range(5):
+        if not beyond[k] > max(1.0, WORSE * told[k]):
+            continue
+        told[k] = beyond[k]
+        at = int(place[k])
+        where = s[at] if k < 2 else 0.5 * (s[at] + s[min(at + 1, s.shape[0] - 1)])
+        if k < 2:
+            note(notes, WARNING, first + k, (value[k], where))
+        elif k == 2:
+            note(notes, WARNING, first + 2, (where, value[2] / 1e3))
+        elif k == 3:
+            note(notes, WARNING, first + (3 if bearable == STEEL_STRAIN else 4), (100.0 * value[3] * bearable, where))
+        else:
+            note(notes, WARNING, first + 5, (value[4],))
 
 
 def of_parameters(parameters: PipeParameters) -> list[str]:

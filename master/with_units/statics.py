@@ -129,7 +129,7 @@ def remarks(at: Prepared) -> list[str]:
     pipe = Pipe(at.pipe)
     state = pipe.at_rest(at.found)
     used = pipe.utilisation(state, pipe.section_forces(state))
-    found = [*validity.of_parameters(at.pipe), *validity.look(pipe, validity.limits(pipe), state, used, validity.QUIET)[0]]
+    found = [*validity.of_parameters(at.pipe), *validity.remarks(pipe, state, used)]
     if at.vessel is not None:
         found += [*vessel_validity.of_parameters(at.vessel), *vessel_validity.look(Vessel(at.vessel).start(), vessel_validity.QUIET)[0]]
     return list(dict.fromkeys(found))

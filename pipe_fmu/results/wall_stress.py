@@ -59,7 +59,7 @@ def _wall(parameters: PipeParameters, s: Array) -> Wall:
 def wall_tension(wall: Wall, position: Array, forces: SectionForces) -> Array:
     """Force (n,) [N] in `wall`: effective tension - p_e A_e + p_i A_i. Nodes of sections without a wall have the effective tension."""
     out = np.empty(len(wall.area))
-    _wall_tension(wall, position, forces.tension, out)
+    fill_wall_tension(wall, position, forces.tension, out)
     return out
 
 
@@ -89,7 +89,7 @@ def _in_wall(wall, i, tension, outside, inside):
 
 
 @inner
-def _wall_tension(wall, position, tension, out):
+def fill_wall_tension(wall, position, tension, out):
     for i in range(out.shape[0]):
         outside, inside = _pressures(wall, position[i, 2], i)
         out[i] = _in_wall(wall, i, tension[i], outside, inside) if wall.area[i] > 0.0 else tension[i]
@@ -101,7 +101,7 @@ def largest_von_mises(wall: Wall, s: Array, position: Array, forces: SectionForc
     `wall` is that of the elements. Between nodes the bending moment is that of section_forces.bending_square; tension, torque and depth
     are linear.
     """
-    stress, utilisation = _largest(wall, s, position, forces)
+    stress, utilisation = largest_stress(wall, s, position, forces)
     return float(stress), float(utilisation)
 
 
@@ -113,7 +113,7 @@ def _von_mises(wall, position, tension, moment, out):
 
 
 @inner
-def _largest(wall, s, position, forces):
+def largest_stress(wall, s, position, forces):
     largest, used, tension, moment = 0.0, 0.0, forces.tension, forces.moment
     for e in range(s.shape[0] - 1):
         for k in range(SAMPLES + 1):
