@@ -35,3 +35,4 @@ drop_stale_cache(Path(__file__).parent)
 kernel = njit(cache=True, error_model="numpy")
 _BARE: dict[str, Any] = {"_nrt": False, "fastmath": {"contract", "arcp", "nsz", "reassoc"}}
 inner = njit(cache=True, error_model="numpy", **_BARE)
+part = njit(cache=True, error_model="numpy", inline="always")

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
-from ..compiled import kernel
+from ..compiled import kernel, part
 from ..element.strains import INSIDE_OUT, inverted
 from ..line import Line, Water
 from .energy import energies
@@ -50,7 +50,7 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     return StepResult(*search(line, water, state, velocity, spin, h, mobility))
 
 
-@kernel
+@part
 def search(line, water, state, velocity, spin, h, mobility):
     """A step by the first of the searches that ends in a configuration of a line; the fields of a StepResult."""
     spent, done, flaw = 0, False, 0

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..compiled import inner, kernel
+from ..compiled import inner, kernel, part
 from ..element.ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
 from ..element.strains import STRAINS
 from ..line import line_columns
@@ -100,7 +100,7 @@ def _made(line, old, x, residual, force, works):
     return math.fabs(made) / (EXCHANGED * exchanged + STORED * stored + _NOTHING)
 
 
-@kernel
+@part
 def solve_step(line, water, state, velocity, spin, h, mobility, weights, damped):
     """One step from a guess of its mean velocities: the sum of those of the last three steps times `weights`.
 
@@ -156,7 +156,7 @@ def _advanced(line, h, state, old, new, x, force, works):
     return PipeState(state.time + h, *moved, last, state.last, state.before, top_work, works)
 
 
-@kernel
+@part
 def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scratch):
     """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (simd/columns.py).
 
