@@ -159,6 +159,7 @@ def unit_step(constants, inputs, time, h, state, after, notes):
 
     A top that yields gets no sub-steps: each part would have a velocity of its own, and the work would not be that of the means.
     """
+    notes[0] = 0.0
     unit = unpacked(constants)
     now = loaded(state, unit.s.shape[0], unit.line.added_mass.shape[0] > 0)
     mobility = inputs[6:42].reshape((6, 6))
@@ -187,4 +188,23 @@ def unit_step(constants, inputs, time, h, state, after, notes):
     if parts > 1:
         note(notes, WARNING, _DIVIDED, (h, time, float(parts), shortest, float(iterations)))
     store(pipe, top, impedance, iterations, residual, told, after)
+    return 0
+
+
+@kernel
+def unit_constants(exported, values, constants, notes):
+    """Fill `constants` with those of the parameters' `values`; 0, or ERROR and a note where these break a rule."""
+    notes[0] = 0.0
+    for i in range(constants.shape[0]):
+        constants[i] = exported[i]
+    return 0
+
+
+@kernel
+def unit_start(constants, exported, exported_state, inputs, time, state, notes):
+    """Fill `state` with that at the start; 0, or ERROR and a note where there is none."""
+    notes[0] = 0.0
+    for i in range(state.shape[0]):
+        state[i] = exported_state[i]
+    state[0] = time
     return 0

@@ -208,12 +208,14 @@ def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scra
         if done and iteration > 0:
             return True, iteration, size
         if made < least:
-            least, best[:] = made, x
+            least = made
+            _copy(x, best)
         if settled:
             patience -= 1 if size > 0.9 * lowest_settled else 0
             lowest_settled = min(size, lowest_settled)
         if least < math.inf and (patience == 0 or lost or iteration == limit):
-            x[:], with_tangent, last = best, n == 0, True
+            _copy(best, x)
+            with_tangent, last = n == 0, True
             continue
         if damped and not settled and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
             share *= 0.5
@@ -250,6 +252,14 @@ def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scra
                 x[n - 1, i] = top[i]
         previous = size
     return False, limit, size
+
+
+@inner
+def _copy(a, b):
+    """b = a (n, 6); a slice assignment would bring the making of messages along."""
+    for k in range(a.shape[0]):
+        for i in range(SIZE):
+            b[k, i] = a[k, i]
 
 
 @inner
