@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .attitude import Array, angles_from_quaternion, apply, fill, heading, product, rotation_matrix
-from .compiled import kernel
+from .compiled import inlined, kernel
 from .hydrodynamics import ADDED_MASS, INERTIA, MASS
 from .parameters import place
 from .rigid_body import mass_matrix
@@ -62,7 +62,7 @@ class ControlState(NamedTuple):
     pull: Array  # (3,) low-passed pull of the pipe, the same
 
 
-@kernel
+@inlined
 def set_point(values: Array) -> Array:
     """Set-point (3,): x, y, m in e, and heading, rad: what the controller names, else where the vessel starts."""
     named = np.empty(3)
@@ -77,7 +77,8 @@ def set_point(values: Array) -> Array:
 def control_law(values: Array) -> Law:
     """The controller of the parameters' `values`."""
     matrix, w = mass_matrix(values[MASS], values[INERTIA], values[ADDED_MASS]), values[FREQUENCY]
-    mass, stiffness, damping, integral, limit = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    table = np.empty((5, 3))
+    mass, stiffness, damping, integral, limit = table[0], table[1], table[2], table[3], table[4]
     for i in range(3):
         mass[i] = matrix[HORIZONTAL[i], HORIZONTAL[i]]
         stiffness[i] = mass[i] * w**2
@@ -99,7 +100,7 @@ def control_law(values: Array) -> Law:
     )
 
 
-@kernel
+@inlined
 def initial_control(hold: Array, pose: Array) -> ControlState:
     """State that applies the constant thrust `hold` (3,); pose (3,) is x, y, yaw."""
     reference = np.zeros((3, 3))
@@ -107,7 +108,7 @@ def initial_control(hold: Array, pose: Array) -> ControlState:
     return ControlState(-1.0, 0.0, reference, np.zeros(3), hold, -hold)
 
 
-@kernel
+@inlined
 def remembered(memory: Array) -> ControlState:
     """The state that `memory` (20,) holds."""
     reference = np.empty((3, 3))
@@ -117,7 +118,7 @@ def remembered(memory: Array) -> ControlState:
     return ControlState(memory[0], memory[1], reference, memory[11:14], memory[14:17], memory[17:20])
 
 
-@kernel
+@inlined
 def remember(state: ControlState, memory: Array) -> None:
     """Fill `memory` (20,) with the state."""
     memory[0], memory[1] = state.sample, state.time
@@ -133,7 +134,7 @@ def wrap(angle: float) -> float:
     return angle - 2.0 * math.pi * np.floor(angle / (2.0 * math.pi) + 0.5)
 
 
-@kernel
+@inlined
 def filtered(reference: Array, set_point: Array, time_constant: float, dt: float) -> Array:
     """Reference (3, 3) after dt: exact solution of (1 + T d/dt)^3 eta_d = set_point."""
     rate, after = 1.0 / time_constant, np.empty((3, 3))
@@ -150,7 +151,7 @@ def filtered(reference: Array, set_point: Array, time_constant: float, dt: float
     return after
 
 
-@kernel
+@inlined
 def pid(law: Law, reference: Array, integral: Array, pull: Array, pose: Array, velocity: Array, dt: float) -> tuple[Array, Array]:
     """Integral (3,) and thrust (3,), both in e, at a sample dt after the last one; pose (x, y, yaw) and its rate."""
     along, rows = heading(pose[2]), np.empty((5, 3))
@@ -169,14 +170,14 @@ def pid(law: Law, reference: Array, integral: Array, pull: Array, pose: Array, v
     return apply(along, total), apply(along, thrust)
 
 
-@kernel
+@inlined
 def due_sample(law: Law, state: ControlState, time: float) -> float:
     """Number of the sample due at `time`, s; -1 if there is none."""
     sample = np.floor((time - law.start) / law.period + GRID_TOLERANCE)
     return sample if sample > state.sample and sample >= 0.0 else -1.0
 
 
-@kernel
+@inlined
 def sampled(law: Law, state: ControlState, sample: float, time: float, pose: Array, velocity: Array) -> ControlState:
     """State after sample number `sample` taken at `time`, s; pose (3,) is x, y, yaw and velocity (3,) its rate, in e."""
     dt, integral, reference = 0.0, state.integral, np.zeros((3, 3))
@@ -192,7 +193,7 @@ def sampled(law: Law, state: ControlState, sample: float, time: float, pose: Arr
     return ControlState(sample, time, reference, integral, thrust, state.pull)
 
 
-@kernel
+@inlined
 def controlled(law: Law, state: ControlState, time: float, position: Array, quaternion: Array, nu: Array) -> ControlState:
     """State with the thrust that acts from `time`, s, on: position (3,) in e, quaternion (4,) b to e, body velocity nu (6,)."""
     sample = due_sample(law, state, time)
@@ -205,7 +206,7 @@ def controlled(law: Law, state: ControlState, time: float, position: Array, quat
     return sampled(law, state, sample, time, pose, velocity)
 
 
-@kernel
+@inlined
 def with_pull(law: Law, state: ControlState, pull: Array, h: float) -> ControlState:
     """State after an accepted step h, s, with the pull (3,) of the pipe held over it: first-order low-pass, exact for a held value."""
     if math.isnan(law.period):
@@ -222,7 +223,7 @@ def holds_for_good(values: Array) -> bool:
     return math.isnan(values[PERIOD]) and (values[HOLD][0] != 0.0 or values[HOLD][1] != 0.0)
 
 
-@kernel
+@inlined
 def hold_energy(values: Array, position: Array) -> float:
     """Potential, J, of a thrust that holds for good, zero at the start: a constant force supplies nothing that it cannot take back."""
     if not holds_for_good(values):

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .attitude import Array, dot
-from .compiled import kernel
+from .compiled import inlined, kernel
 from .environment import time_factor
 from .parameters import SURFACE_FACTOR, place
 from .rigid_body import mass_matrix, symmetric_matrix
@@ -73,7 +73,7 @@ def hull_constants(values: Array) -> Hull:
     return Hull(mass, damping, stiffness, values[FLOTATION], surge_drag, strips, values[HANG_OFF])
 
 
-@kernel
+@inlined
 def surface_current(values: Array, time: float) -> Array:
     """Current velocity (3,), m/s in e, of the surface water at `time`, s; zero where there is none."""
     velocity = np.zeros(3)
@@ -93,9 +93,7 @@ def restoring_energy(stiffness: Array, flotation: float, heave: float, rotation:
 
 
 @kernel
-def add_restoring(
-    stiffness: Array, flotation: float, heave: float, down: Array, axis: Array, nu: Array, h: float, force: Array
-) -> None:
+def add_restoring(stiffness: Array, flotation: float, heave: float, down: Array, axis: Array, nu: Array, h: float, force: Array) -> None:
     """Add the mean of dU over a step, left-hand side of (48), to `force` (6,), N and N m in b.
 
     `heave`, m, and `down` = R_old^T e3 (3,) are those at the start of the step, `axis` (3,) the mean of R^T e3, nu (6,)

@@ -11,12 +11,23 @@ import numpy as np
 
 from .attitude import Array, along_heading, angles_from_quaternion, fill, quaternion_from_angles, rotation_matrix
 from .compiled import kernel
-from .dp_controller import HOLD, MEMORY, control_law, controlled, hold_energy, holds_for_good, initial_control, remember, remembered, with_pull
+from .dp_controller import (
+    HOLD,
+    MEMORY,
+    control_law,
+    controlled,
+    hold_energy,
+    holds_for_good,
+    initial_control,
+    remember,
+    remembered,
+    with_pull,
+)
 from .environment import Current
 from .hydrodynamics import hull_constants, restoring_energy, surface_current
 from .integrator import ROUND_OFF, advance
-from .notes import DISCARD, ERROR, add_note
-from .parameters import NAMES, SURFACE_FACTOR, VesselParameters, place, values
+from .notes import DISCARD, ERROR, add_note, blank, texts
+from .parameters import SURFACE_FACTOR, VesselParameters, place, values
 from .ports import INPUTS, OUTPUTS, WORKS, outputs
 from .pose import centre, hang_off_pose, hang_off_velocity, moment_about_centre
 from .rigid_body import kinetic_energy
@@ -26,7 +37,7 @@ from .validity import look, look_at_parameters
 from .vectors import numbers, parts, total
 
 MESSAGES = (*REMARKS, "vessel: Newton stopped at a relative unbalance of %.1e after %d iterations")
-NOT_CONVERGED = len(REMARKS)
+NOT_CONVERGED = float(len(REMARKS))
 N_GROUPS = 1  # of outputs that are computed at once
 STATE = {
     "position": 3,  # m, x and y in e, z counted from the heave equilibrium (keeps round-off of the energy small)
@@ -66,24 +77,23 @@ def unit_constants(exported: Array, values: Array, constants: Array, notes: Arra
         or refused_added_mass(values[MASS], values[INERTIA], values[ADDED_MASS], notes)
         or refused_limits(values[HOLD], values[ATTITUDE][2], control_law(values).limit, notes)
     ):
-        return ERROR
+        return int(ERROR)
     if values[PROFILE] == TABULATED and exported[PROFILE] != TABULATED:
-        add_note(notes, ERROR, TABLE, values[:0])
-        return ERROR
+        add_note(notes, ERROR, TABLE, 0.0, 0.0, 0.0)
+        return int(ERROR)
     if holds_for_good(values) != holds_for_good(exported):
-        add_note(notes, ERROR, CHANGES_PORT if holds_for_good(exported) else ADDS_PORT, values[:0])
-        return ERROR
+        add_note(notes, ERROR, CHANGES_PORT if holds_for_good(exported) else ADDS_PORT, 0.0, 0.0, 0.0)
+        return int(ERROR)
     fill(constants, values)
     return 0
 
 
 @kernel
-def unit_start(
-    constants: Array, exported: Array, exported_state: Array, inputs: Array, time: float, state: Array, notes: Array
-) -> int:
+def unit_start(constants: Array, exported: Array, exported_state: Array, inputs: Array, time: float, state: Array, notes: Array) -> int:
     """Fill `state` with the pose, velocity and hold thrust of the parameters and the mobility zero of a step of no length; never fails."""
     notes[0] = 0.0
-    state[:] = 0.0
+    for i in range(N_STATE):
+        state[i] = 0.0
     position, attitude, quaternion, nu = state[AT.position], constants[ATTITUDE], state[AT.quaternion], state[AT.body_velocity]
     fill(position, constants[POSITION])
     position[2] += constants[DEPTH]
@@ -100,8 +110,9 @@ def unit_start(
 
 
 @kernel
-def step(constants: Array, inputs: Array, time: float, h: float, state: Array, after: Array) -> tuple[int, float]:
-    """Step of length h, s, from `time`, s: iterations and relative unbalance left; fills `after` where that is below ROUND_OFF."""
+def unit_step(constants: Array, inputs: Array, time: float, h: float, state: Array, after: Array, notes: Array) -> int:
+    """Fill `after` with the state a step h, s, from `time`, s, leads to; 2 and a note, `after` untouched, if Newton did not converge."""
+    notes[0] = 0.0
     hull, law = hull_constants(constants), control_law(constants)
     position, quaternion, nu = state[AT.position], state[AT.quaternion], state[AT.body_velocity]
     control = controlled(law, remembered(state[AT.control]), time, position, quaternion, nu)
@@ -109,39 +120,28 @@ def step(constants: Array, inputs: Array, time: float, h: float, state: Array, a
     for i in range(3):
         loads[0, i] = inputs[IN.force][i] + inputs[IN.force_change][i]
         loads[1, i] = inputs[IN.moment][i] + inputs[IN.moment_change][i]
-    fill(loads[2], control.thrust)
-    fill(loads[3], inputs[IN.control_force])
-    fill(loads[4], inputs[IN.environment_force])
-    fill(loads[5], inputs[IN.environment_moment])
+        loads[2, i] = control.thrust[i]
+        loads[3, i] = inputs[IN.control_force][i]
+        loads[4, i] = inputs[IN.environment_force][i]
+        loads[5, i] = inputs[IN.environment_moment][i]
+        loads[7, i] = inputs[IN.environment_force_b][i]
+        loads[8, i] = inputs[IN.environment_moment_b][i]
     fill(loads[6], surface_current(constants, time + 0.5 * h))
-    fill(loads[7], inputs[IN.environment_force_b])
-    fill(loads[8], inputs[IN.environment_moment_b])
     moved, turned, velocity, mean_velocity, mobility, works, iterations, residual = advance(hull, position, quaternion, nu, loads, h)
-    if residual < ROUND_OFF:
-        pull = loads[0].copy()
-        pull[2] = moment_about_centre(constants, quaternion, loads[0], loads[1])[2]
-        control = with_pull(law, control, pull, h)
-        fill(after[AT.position], moved)
-        fill(after[AT.quaternion], turned)
-        fill(after[AT.body_velocity], velocity)
-        fill(after[AT.mean_velocity], mean_velocity)
-        response, total = after[AT.mobility], after[AT.works]
-        for i in range(6):
-            fill(response[6 * i : 6 * i + 6], mobility[i])
-            total[i] = state[AT.works][i] + works[i]
-        remember(control, after[AT.control])
-        fill(after[AT.told], state[AT.told])
-    return iterations, residual
-
-
-@kernel
-def unit_step(constants: Array, inputs: Array, time: float, h: float, state: Array, after: Array, notes: Array) -> int:
-    """Fill `after` with the state a step h, s, from `time`, s, leads to; 2 and a note, `after` untouched, if Newton did not converge."""
-    notes[0] = 0.0
-    iterations, residual = step(constants, inputs, time, h, state, after)
     if not residual < ROUND_OFF:
-        add_note(notes, DISCARD, NOT_CONVERGED, np.array([residual, float(iterations)]))
-        return DISCARD
+        add_note(notes, DISCARD, NOT_CONVERGED, 2.0, residual, float(iterations))
+        return int(DISCARD)
+    pull = loads[0].copy()
+    pull[2] = moment_about_centre(constants, quaternion, loads[0], loads[1])[2]
+    remember(with_pull(law, control, pull, h), after[AT.control])
+    fill(after[AT.position], moved)
+    fill(after[AT.quaternion], turned)
+    fill(after[AT.body_velocity], velocity)
+    fill(after[AT.mean_velocity], mean_velocity)
+    for i in range(6):
+        after[AT.works][i] = state[AT.works][i] + works[i]
+        fill(after[AT.mobility][6 * i : 6 * i + 6], mobility[i])
+    fill(after[AT.told], state[AT.told])
     look(after[AT.quaternion], after[AT.told], notes)
     return 0
 
@@ -189,3 +189,10 @@ def value_places(parameters: VesselParameters) -> dict[str, int]:
 def output_places(parameters: VesselParameters) -> dict[str, tuple[slice, int]]:
     """Slice of the outputs and group of each output port."""
     return {name: (getattr(OUT, name), 0) for name in outputs(parameters)}
+
+
+def started(parameters: VesselParameters) -> tuple[Array, list[str]]:
+    """State (n,) of a unit at its start, and what it says of it, a line each."""
+    given, state, notes = constants(parameters), np.empty(N_STATE), blank()
+    unit_start(given, given, state, np.zeros(N_INPUTS), 0.0, state, notes)
+    return state, texts(notes, MESSAGES)

@@ -10,19 +10,21 @@ import numpy as np
 from .attitude import Array
 from .compiled import kernel
 
-WARNING, DISCARD, ERROR = 1, 2, 3  # of a note: the step or start is done; not done; a value is refused
+WARNING, DISCARD, ERROR = 1.0, 2.0, 3.0  # of a note: the step or start is done; not done; a value is refused
 SIZE = 256
 
 
 @kernel
-def add_note(notes: Array, status: int, message: int, values: Array) -> None:
-    """Append a note with the template number `message` and its `values` to `notes`."""
+def add_note(notes: Array, status: float, message: float, count: float, first: float, second: float) -> None:
+    """Append a note with the template number `message` and `count` of the two values to `notes`; no integers, for one compiled version."""
     at = 1
     for _ in range(int(notes[0])):
         at += 3 + int(notes[at + 2])
-    notes[at], notes[at + 1], notes[at + 2] = status, message, len(values)
-    for i in range(len(values)):
-        notes[at + 3 + i] = values[i]
+    notes[at], notes[at + 1], notes[at + 2] = status, message, count
+    if count > 0.0:
+        notes[at + 3] = first
+    if count > 1.0:
+        notes[at + 4] = second
     notes[0] += 1.0
 
 

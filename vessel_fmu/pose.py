@@ -7,14 +7,14 @@ R_y(-alpha), turned further by the departure rotation vector rho in b: R_t = R_b
 import numpy as np
 
 from .attitude import Array, add_cross, apply, exp_quaternion, fill, multiply, rotation_matrix
-from .compiled import kernel
+from .compiled import inlined, kernel
 from .hydrodynamics import HANG_OFF
 from .parameters import place
 
 ANGLE, ROTATION, DEPTH = place("departure_angle"), place("departure_rotation"), place("environment.depth")
 
 
-@kernel
+@inlined
 def centre(values: Array, position: Array) -> Array:
     """Centre of gravity (3,), m in e, of a `position` whose third entry counts from the heave equilibrium."""
     point = position.copy()
@@ -22,15 +22,15 @@ def centre(values: Array, position: Array) -> Array:
     return point
 
 
-@kernel
+@inlined
 def held_section(values: Array) -> Array:
     """Orientation (4,) t to b of the pipe section held at the hang-off point."""
-    return multiply(exp_quaternion(values[ROTATION], 1.0), exp_quaternion(np.array([0.0, 1.0, 0.0]), values[ANGLE]))
+    return multiply(exp_quaternion(values[ROTATION], 1.0), exp_quaternion(np.eye(3)[1], values[ANGLE]))
 
 
-@kernel
+@inlined
 def hang_off_pose(values: Array, point: Array, quaternion: Array) -> tuple[Array, Array]:
-    """Hang-off point (3,), m in e, and orientation (4,) t to e of the pipe section held there, eq. (5); `point` is the centre of gravity."""
+    """Hang-off point (3,), m in e, and orientation (4,) t to e of the section held there, eq. (5); `point` is the centre of gravity."""
     top = apply(rotation_matrix(quaternion), values[HANG_OFF])
     for i in range(3):
         top[i] += point[i]
@@ -47,7 +47,7 @@ def hang_off_velocity(values: Array, quaternion: Array, nu: Array) -> Array:
     return velocity
 
 
-@kernel
+@inlined
 def moment_about_centre(values: Array, quaternion: Array, force: Array, moment: Array) -> Array:
     """Moment (3,), N m in e, about the centre of gravity of a force and a moment at the hang-off point."""
     total = moment.copy()

@@ -6,8 +6,6 @@ NaN, what an absent parameter is, breaks no rule.
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from .attitude import Array, along_heading
 from .compiled import kernel
 from .environment import NEEDS_TABLE
@@ -29,8 +27,8 @@ RULES = (
     f"hold_force: adds {HOLD_PORT}",
     f"hold_force: changes {HOLD_PORT}",
 )  # templates of notes
-DAMPING, ADDED_MASS, LIMIT = 0, len(COUPLINGS), 2 * len(COUPLINGS)
-RATIO, TABLE, ADDS_PORT, CHANGES_PORT = range(LIMIT + 3, LIMIT + 7)
+DAMPING, ADDED_MASS, LIMIT = 0.0, float(len(COUPLINGS)), 2.0 * len(COUPLINGS)  # numbers of the first of a kind
+RATIO, TABLE, ADDS_PORT, CHANGES_PORT = (LIMIT + 3.0 + i for i in range(4))
 
 
 @kernel
@@ -42,7 +40,7 @@ def refused_damping(damping: Array, notes: Array) -> bool:
     refused = indefinite(symmetric_matrix(damping), max(SEMIDEFINITE * largest, TINY))
     if refused:
         worst = largest_coupling(damping)
-        add_note(notes, ERROR, DAMPING + worst, damping[6 + worst : 7 + worst])
+        add_note(notes, ERROR, DAMPING + worst, 1.0, damping[6 + worst], 0.0)
     return refused
 
 
@@ -52,7 +50,7 @@ def refused_added_mass(mass: float, inertia: Array, added_mass: Array, notes: Ar
     refused = indefinite(mass_matrix(mass, inertia, added_mass), 0.0)
     if refused:
         worst = largest_coupling(added_mass)
-        add_note(notes, ERROR, ADDED_MASS + worst, added_mass[6 + worst : 7 + worst])
+        add_note(notes, ERROR, ADDED_MASS + worst, 1.0, added_mass[6 + worst], 0.0)
     return refused
 
 
@@ -62,7 +60,7 @@ def refused_ratio(damping_ratio: float, integral_ratio: float, notes: Array) -> 
     largest = 2.0 * damping_ratio
     refused = integral_ratio >= largest
     if refused:
-        add_note(notes, ERROR, RATIO, np.array([integral_ratio, largest]))
+        add_note(notes, ERROR, RATIO, 2.0, integral_ratio, largest)
     return refused
 
 
@@ -72,7 +70,7 @@ def refused_limits(hold: Array, yaw: float, limits: Array, notes: Array) -> bool
     thrust = along_heading(yaw, hold)
     for i in range(3):
         if abs(thrust[i]) > limits[i]:
-            add_note(notes, ERROR, LIMIT + i, np.array([limits[i], abs(thrust[i])]))
+            add_note(notes, ERROR, LIMIT + i, 2.0, limits[i], abs(thrust[i]))
             return True
     return False
 

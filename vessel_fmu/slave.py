@@ -26,8 +26,8 @@ class VesselUnit:
         self._constants = native.constants(parameters)
         self._places = native.output_places(parameters)
         self._notes = blank()
-        self.remark = ""  # what the host's log should say of the start, or of the last step that was done; a line each
-        self._begin(0.0, np.zeros(native.N_INPUTS))
+        self._start, self._said_of_it = native.started(parameters)
+        self.state, self.remark = self._start, ""  # what the host's log should say of the start, or of the last step that was done
 
     @staticmethod
     def nominal(parameters: VesselParameters) -> dict[str, float]:
@@ -38,27 +38,18 @@ class VesselUnit:
 
     def initialize(self, time: float, inputs: dict[str, Array]) -> str | None:
         """Take the pose, velocity and hold thrust of the parameters; never fails."""
-        self._begin(time, np.concatenate([inputs[name] for name in self.INPUTS]))
-        self.remark = "\n".join(self._said())
+        self.state, self.remark = self._start, "\n".join(self._said_of_it)
         return None
-
-    def _begin(self, time: float, inputs: Array) -> None:
-        state = np.empty(native.N_STATE)
-        native.unit_start(self._constants, self._constants, state, inputs, time, state, self._notes)
-        self.state = state
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
         """Step from `time`, s, by h, s; a message and the state unchanged if Newton did not converge."""
         given, after = np.concatenate([inputs[name] for name in self.INPUTS]), np.empty(native.N_STATE)
         status = native.unit_step(self._constants, given, time, h, self.state, after, self._notes)
-        said = "\n".join(self._said())
+        said = "\n".join(texts(self._notes, native.MESSAGES))
         if status != 0:
             return said
         self.state, self.remark = after, said
         return None
-
-    def _said(self) -> list[str]:
-        return texts(self._notes, native.MESSAGES)
 
     @property
     def state(self) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from .attitude import Array, angles_from_quaternion
 from .checks import usually
-from .compiled import kernel
+from .compiled import inlined, kernel
 from .notes import WARNING, add_note
 from .parameters import VesselParameters, place
 from .rules import RULES
@@ -20,7 +20,7 @@ WORSE = 1.5  # times what was said last is said again
 _BOUNDED = [it for it in numbers(VesselParameters, None) if "usual" in it.metadata]
 USUAL = np.array([it.metadata["usual"] for it in _BOUNDED])
 PLACES = np.array([place(it.name) for it in _BOUNDED])
-ANGLES, NUMBERS = len(RULES), len(RULES) + len(LIMITS)  # first message of each kind
+ANGLES, NUMBERS = float(len(RULES)), float(len(RULES) + len(LIMITS))  # first message of each kind
 MESSAGES = (
     *RULES,
     *(f"the vessel's {name} is %.3g degrees; its restoring holds to some {math.degrees(limit):g}" for name, limit in LIMITS.items()),
@@ -35,14 +35,14 @@ def look(quaternion: Array, told: Array, notes: Array) -> None:
     for i in range(2):
         beyond = abs(angles[i]) / LARGEST[i]
         if beyond > max(1.0, WORSE * told[i]):
-            add_note(notes, WARNING, ANGLES + i, np.array([math.degrees(angles[i])]))
+            add_note(notes, WARNING, ANGLES + i, 1.0, math.degrees(angles[i]), 0.0)
             told[i] = beyond
 
 
-@kernel
+@inlined
 def look_at_parameters(values: Array, notes: Array) -> None:
     """Note each number that is not usual: its unit may be wrong."""
     for k in range(len(PLACES)):
         value = values[PLACES[k]]
         if value != 0.0 and (value < USUAL[k, 0] or value > USUAL[k, 1]):
-            add_note(notes, WARNING, NUMBERS + k, np.array([value]))
+            add_note(notes, WARNING, NUMBERS + k, 1.0, value, 0.0)

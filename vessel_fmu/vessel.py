@@ -8,8 +8,7 @@ from . import native, pose
 from .attitude import Array, along_heading, angles_from_quaternion, rotation_matrix
 from .dp_controller import HOLD, ControlState, control_law, controlled, hold_energy, remembered
 from .hydrodynamics import add_drag, add_restoring, hull_constants, restoring_energy, surface_current
-from .integrator import ROUND_OFF
-from .notes import blank
+from .notes import blank, texts
 from .parameters import VesselParameters
 from .ports import INPUTS
 from .rigid_body import kinetic_energy
@@ -46,8 +45,7 @@ class Step(NamedTuple):
 
     state: State
     converged: bool
-    iterations: int
-    residual: float  # unbalance left, over the terms that make it up
+    message: str  # what Newton left, without convergence
 
 
 class Vessel:
@@ -62,18 +60,17 @@ class Vessel:
 
     def start(self) -> State:
         """State at the start: pose and velocity of the parameters, hold thrust, and the mobility zero of a step of no length."""
-        vector, inputs = np.empty(native.N_STATE), np.zeros(native.N_INPUTS)
-        native.unit_start(self.constants, self.constants, vector, inputs, 0.0, vector, blank())
-        return from_vector(vector)
+        return from_vector(native.started(self.parameters)[0])
 
     def step(self, state: State, time: float, h: float, inputs: Inputs) -> Step:
         """Step of length h, s, from `time`, s; discretely passive for any h. Raises ValueError for h <= 0."""
         if not h > 0.0:
             raise ValueError(f"h = {h}: must be > 0 s")
         given, after = np.concatenate([getattr(inputs, name, ZERO3) for name in INPUTS]), np.empty(native.N_STATE)
-        iterations, residual = native.step(self.constants, given, float(time), float(h), to_vector(state), after)
-        converged = residual < ROUND_OFF
-        return Step(from_vector(after) if converged else state, converged, iterations, residual)
+        notes = blank()
+        if native.unit_step(self.constants, given, float(time), float(h), to_vector(state), after, notes) != 0:
+            return Step(state, False, texts(notes, native.MESSAGES)[0])
+        return Step(from_vector(after), True, "")
 
     def control(self, state: State, time: float) -> ControlState:
         """Memory of the controller with the thrust that acts from `time`, s, on."""
