@@ -84,7 +84,9 @@ def parser() -> argparse.ArgumentParser:
     portable = "put Python and compiled kernels into the FMUs, for machines without them (Linux x86-64; 100 MB each)"
     export.add_argument("--portable", action="store_true", help=portable)
 
-    command("scenes", "List the built-in scenes.", "Copy one of their files for a scene of your own; `pipelay keys` lists what it may say.")
+    command(
+        "scenes", "List the built-in scenes.", "Copy one of their files for a scene of your own; `pipelay keys` lists what it may say."
+    )
     command(
         "keys",
         "List what a scene of pipe and vessel may say: keys, defaults, units.",

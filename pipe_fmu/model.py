@@ -206,7 +206,6 @@ def _mean_weight(parameters: PipeParameters) -> float:
 
 def _picker(parameters: PipeParameters, s: Array) -> Callable[[Callable[[Section], object]], Array]:
     """Function that lists a property of the section of every element."""
-
     def pick(property_of: Callable[[Section], object]) -> Array:
         return _by_section(parameters, s, np.array([property_of(section) for section in parameters.all_sections], dtype=float))
 

@@ -83,14 +83,11 @@ def rest():
     return own_step.quarters(pipe, found.position, found.quaternion).ravel(), found.top[:3]
 
 
-@pytest.mark.parametrize(
-    ("contestant", "setting", "metres", "share"),
-    [
-        (paper_method, Setting("paper", 48, 1e-3), 0.06, 2e-3),
-        (peer_exudyn, Setting(line.EXUDYN, 48, 0.1), 5e-3, 1e-4),
-        (peer_moordyn, Setting(line.MOORDYN, 48, 0.00625), 0.06, 2e-2),
-    ],
-)
+@pytest.mark.parametrize(("contestant", "setting", "metres", "share"), [
+    (paper_method, Setting("paper", 48, 1e-3), 0.06, 2e-3),
+    (peer_exudyn, Setting(line.EXUDYN, 48, 0.1), 5e-3, 1e-4),
+    (peer_moordyn, Setting(line.MOORDYN, 48, 0.00625), 0.06, 2e-2),
+])
 def test_every_contestant_hangs_as_the_same_line(contestant, setting, metres, share):
     """Held still: weight, current, drag, stiffness and clamp agree, to the error of 25 m elements (linear, cubic, lumped)."""
     needs = {peer_exudyn: "exudyn", peer_moordyn: "moordyn"}.get(contestant)

@@ -245,7 +245,9 @@ def _several(names: Names) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else names
 
 
-def impedance_end(fmu: Fmu, bond: Bond, derivative: str | None = "impedance", rollback: bool = True, yielding: str = "mobility") -> FmuEnd:
+def impedance_end(
+    fmu: Fmu, bond: Bond, derivative: str | None = "impedance", rollback: bool = True, yielding: str = "mobility"
+) -> FmuEnd:
     """The end that takes flows and returns efforts; its `derivative` port is dF/dV with F = -effort."""
     yielding = yielding if bond.met_flows else ""
     return FmuEnd(

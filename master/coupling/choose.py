@@ -21,7 +21,9 @@ def _energy_consistent(impedance: End, mobility: End, bond: Bond, macro_step: fl
     return (OneSided if one_sided else EnergyConsistent)(impedance, mobility, bond, macro_step, tolerance, check)
 
 
-def _explicit(impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float, check: Check, *, serial: bool) -> Scheme:
+def _explicit(
+    impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float, check: Check, *, serial: bool
+) -> Scheme:
     return Explicit(impedance, mobility, bond, macro_step, serial, check)
 
 

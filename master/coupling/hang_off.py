@@ -11,12 +11,8 @@ def hang_off() -> Bond:
         (
             Pair("force", "velocity", 1e-6, end_effort="end_force", end_flow="end_velocity", met_flow="top_velocity"),
             Pair(
-                "moment",
-                "angular_velocity",
-                1e-8,
-                end_effort="end_moment",
-                end_flow="end_angular_velocity",
-                met_flow="top_angular_velocity",
+                "moment", "angular_velocity", 1e-8,
+                end_effort="end_moment", end_flow="end_angular_velocity", met_flow="top_angular_velocity",
             ),
         )
     )

@@ -76,7 +76,9 @@ class Sections:
         elif self.top_motion is not None:
             raise ValueError("top_motion: must be absent where [vessel] moves the top")
         elif self.start.z is not None:
-            raise ValueError(f"start.z = {self.start.z:g}: must be absent with [vessel], which floats at its own height")
+            raise ValueError(
+                f"start.z = {self.start.z:g}: must be absent with [vessel], which floats at its own height"
+            )
 
     def _check_pipe_alone(self) -> None:
         if self.start.z is None:
@@ -150,7 +152,9 @@ def _read(name: str, path: Path) -> bytes:
             return (BUILT_IN / f"{name}.toml").read_bytes()
         near = difflib.get_close_matches(name, names, 1, 0.5)
         hint = f" (did you mean {near[0]}?)" if near else ""
-        raise SceneError(f"scene = {name!r}: unknown built-in scene{hint}; there are {', '.join(names)}, or give a .toml file")
+        raise SceneError(
+            f"scene = {name!r}: unknown built-in scene{hint}; there are {', '.join(names)}, or give a .toml file"
+        )
     if path.suffix != ".toml":
         raise SceneError(f"scene = {name!r}: a scene file must end in .toml")
     try:
@@ -206,7 +210,9 @@ def _parse_change(change: str) -> dict[str, Any]:
     except SceneError:
         raise
     except (ValueError, RecursionError):
-        rule = 'the value must be a number, true, false, [a, list] or a "text" in quotes (quote the whole for the shell)'
+        rule = (
+            'the value must be a number, true, false, [a, list] or a "text" in quotes (quote the whole for the shell)'
+        )
         shown = change if len(change) <= 80 else change[:77] + "..."
         raise SceneError(f"--set {shown}: {rule}") from None
 

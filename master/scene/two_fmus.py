@@ -1,18 +1,18 @@
 """Scenes of any two FMUs on a power bond: the tables [units], [bond] and [[connections]]; see `master.run.wiring` for the ports.
 
-[units.a]                            # two units, names of one's own
-fmu = "a.fmu"                        # beside the scene file
-parameters = {stiffness = 2.0}
-inputs = {load = [1.0, 0.0, 0.0]}    # held for good, unless connected
-outputs = ["position"]               # recorded
-energy = {stored = ["elastic_energy"], supplied = [], dissipated = ["damper_heat"], bond = "top_work"}
-[bond]
-impedance = "a"                      # takes flows, answers efforts
-mobility = "b"                       # takes efforts, answers flows
-pairs = [{effort = "force", flow = "velocity", floor = 1e-6}]
-[[connections]]                      # further ones, held over each macro step
-from = "a.position"
-to = "b.target"
+    [units.a]                            # two units, names of one's own
+    fmu = "a.fmu"                        # beside the scene file
+    parameters = {stiffness = 2.0}
+    inputs = {load = [1.0, 0.0, 0.0]}    # held for good, unless connected
+    outputs = ["position"]               # recorded
+    energy = {stored = ["elastic_energy"], supplied = [], dissipated = ["damper_heat"], bond = "top_work"}
+    [bond]
+    impedance = "a"                      # takes flows, answers efforts
+    mobility = "b"                       # takes efforts, answers flows
+    pairs = [{effort = "force", flow = "velocity", floor = 1e-6}]
+    [[connections]]                      # further ones, held over each macro step
+    from = "a.position"
+    to = "b.target"
 """
 
 from __future__ import annotations

@@ -191,7 +191,8 @@ def _hang(pipe: Pipe, point: np.ndarray, attitude: Rotation | None) -> Equilibri
     found = pipe.equilibrium(_three(point), held, 0.0)
     if not found.converged:
         raise RunError(
-            f"statics: the pipe finds no equilibrium with its top at {tuple(np.round(point, 3).tolist())} m: {found.unbalance(pipe.s)}"
+            f"statics: the pipe finds no equilibrium with its top at {tuple(np.round(point, 3).tolist())} m: "
+            f"{found.unbalance(pipe.s)}"
         )
     return found
 

@@ -34,6 +34,7 @@ class Loads(NamedTuple):
     bed: Bed
 
 
+
 def present(parameters: Any) -> dict[str, bool]:
     """Whether the parameters name the physics behind a port of the ledger, of those that may be absent."""
     return dict.fromkeys(bed.LEDGER, parameters.seabed is not None)

@@ -56,6 +56,7 @@ class Bed(NamedTuple):
     friction_speed: float  # [m/s]
 
 
+
 def bed_of(seabed: Seabed | None, bearing: Array, diameter: Array) -> Bed:
     """The bed under elements that lie with `bearing` (n - 1,) and `diameter` (n - 1,), or none."""
     if seabed is None:

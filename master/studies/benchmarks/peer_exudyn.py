@@ -65,7 +65,6 @@ def run(parameters: PipeParameters, case: LineCase, setting: Setting) -> tuple[f
     """
     sys.exudynFast = True  # type: ignore[attr-defined]
     import exudyn as exu
-
     items = import_module("exudyn.itemInterface")
 
     mbs = exu.SystemContainer().AddSystem()

@@ -92,3 +92,4 @@ def equilibrium() -> tuple[np.ndarray, float]:
     inner, outer = opening**2, (1.0 - opening) ** 2
     first, second = (TANK * outer + PUMP * inner) / (inner + outer), (TANK * inner + PUMP * outer) / (inner + outer)
     return np.array([first, second]), opening
+
