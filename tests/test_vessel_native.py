@@ -66,7 +66,9 @@ def test_constants_of_changed_values_are_those_of_the_changed_dataclass():
         target, exported = random_parameters(rng), random_parameters(rng)
         for name in ("damping", "drag", "controller"):
             like = getattr(target, name)
-            exported = replace(exported, **{name: like and replace(like, **{fields(like)[-1].name: 1.5 * getattr(like, fields(like)[-1].name)})})
+            exported = replace(
+                exported, **{name: like and replace(like, **{fields(like)[-1].name: 1.5 * getattr(like, fields(like)[-1].name)})}
+            )
         sea = replace(exported.environment, current=target.environment.current)
         exported = replace(exported, environment=sea)
         flat, places = schema.flatten(target), native.value_places(exported)
@@ -130,7 +132,9 @@ def test_a_hold_that_comes_or_goes_for_good_changes_the_ports():
     assert ("hold_energy" in outputs(without), "hold_energy" in outputs(still), "hold_energy" in outputs(FULL)) == (True, False, False)
 
 
-@pytest.mark.parametrize("change", [{}, {"mass": 1e4}, {"environment.depth": 13e3, "hang_off[1]": -400.0, "start.attitude[1]": 0.5}], ids=str)
+@pytest.mark.parametrize(
+    "change", [{}, {"mass": 1e4}, {"environment.depth": 13e3, "hang_off[1]": -400.0, "start.attitude[1]": 0.5}], ids=str
+)
 def test_the_start_of_changed_values_is_that_of_the_changed_dataclass_with_its_remarks(change):
     target = schema.override(VesselParameters(added_mass=AddedMass(heave_pitch=0.0, sway_yaw=0.0)), change)
     _, constants, _ = constants_of(native.constants(target), native.values(target))
@@ -143,7 +147,9 @@ def test_the_start_of_changed_values_is_that_of_the_changed_dataclass_with_its_r
     assert len(texts(notes, native.MESSAGES)) == len(change)
 
 
-@pytest.mark.parametrize("parameters", [FULL, TABLE, replace(FULL, controller=None, drag=None, damping=None)], ids=["full", "table", "bare"])
+@pytest.mark.parametrize(
+    "parameters", [FULL, TABLE, replace(FULL, controller=None, drag=None, damping=None)], ids=["full", "table", "bare"]
+)
 def test_kernels_unit_and_facade_step_alike_to_the_last_bit(parameters):
     unit, vessel, rng = VesselUnit(parameters), Vessel(parameters), np.random.default_rng(9)
     constants, notes = native.constants(parameters), blank()

@@ -44,7 +44,9 @@ def vector(tree: Any) -> Array:
 def parts(sizes: Mapping[str, int]) -> Any:
     """Named tuple of slices of a vector that holds vectors of these sizes one after another."""
     ends = np.cumsum(list(sizes.values())).tolist()
-    return namedtuple("Parts", sizes)(*(slice(end - size, end) for end, size in zip(ends, sizes.values(), strict=True)))
+    slices = [slice(end - size, end) for end, size in zip(ends, sizes.values(), strict=True)]
+    kind: Any = namedtuple("Parts", sizes)
+    return kind(*slices)
 
 
 def total(sizes: Mapping[str, int]) -> int:

@@ -135,6 +135,5 @@ def to_vector(state: State) -> Array:
 
 def from_vector(vector: Array) -> State:
     """The state that a vector holds."""
-    *arrays, control, _ = (vector[part] for part in native.AT)
-    arrays[State._fields.index("mobility")] = vector[native.AT.mobility].reshape(6, 6)
-    return State(*arrays, remembered(control))
+    found = {name: vector[getattr(native.AT, name)] for name in State._fields}
+    return State(**found | {"mobility": found["mobility"].reshape(6, 6), "control": remembered(found["control"])})
