@@ -177,10 +177,15 @@ def test_a_step_that_does_not_converge_leaves_the_vector_it_was_to_fill():
 
 
 POINTER = types.CPointer(types.float64)
+LIBRARY = {"atan2", "expm1", "hypot", "sqrt"}
+FAILURES = {  # Python's, on the way out where memory is short; whoever links the code without Python must replace them
+    "PyBytes_FromStringAndSize", "PyErr_Clear", "PyErr_SetNone", "PyErr_SetString", "PyErr_WriteUnraisable", "PyUnicode_FromString",
+    "Py_DecRef", "numba_do_raise", "numba_gil_ensure", "numba_gil_release", "numba_runtime_build_excinfo_struct", "numba_unpickle",
+}  # fmt: skip
 
 
 def test_kernels_are_machine_code_that_needs_no_blas():
-    """Compiled with plain pointers, as for an FMU: it gives the same bits, and calls the C library, numba's memory and LLVM's own alone."""
+    """Compiled with plain pointers, as for an FMU: the same bits; beside the C library, numba's memory and LLVM's own only FAILURES."""
     constants, state = native.constants(FULL), VesselUnit(FULL).state
     n_constants, n_inputs, n_state, n_notes = native.N_CONSTANTS, native.N_INPUTS, native.N_STATE, len(blank())
 
@@ -202,5 +207,5 @@ def test_kernels_are_machine_code_that_needs_no_blas():
     assert native.unit_step(constants, inputs, 1.0, 0.1, state, again, notes) == 0
     assert after.tobytes() == again.tobytes()
     declared = set(re.findall(r"^declare .*?@\"?([\w.$]+)", unit_step._library.get_llvm_str(), re.MULTILINE))
-    ours = {name for name in declared if not name.startswith(("NRT_", "llvm.", "Py", "numba_"))}
-    assert ours <= {"atan2", "cos", "sin", "exp", "expm1", "floor", "fmod", "hypot", "sqrt", "pow"}, ours
+    others = {name for name in declared if not name.startswith(("NRT_", "llvm."))}
+    assert others <= LIBRARY | FAILURES

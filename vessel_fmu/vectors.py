@@ -45,8 +45,8 @@ def parts(sizes: Mapping[str, int]) -> Any:
     """Named tuple of slices of a vector that holds vectors of these sizes one after another."""
     ends = np.cumsum(list(sizes.values())).tolist()
     slices = [slice(end - size, end) for end, size in zip(ends, sizes.values(), strict=True)]
-    kind: Any = namedtuple("Parts", sizes)
-    return kind(*slices)
+    make: Any = namedtuple
+    return make("Parts", list(sizes))(*slices)
 
 
 def total(sizes: Mapping[str, int]) -> int:
