@@ -5,7 +5,8 @@ calls. So when any source of the package is newer than a cache index, all indice
 everything is compiled afresh.
 
 An `inner` kernel allocates no array, so those it is given need no counting of references, which would cost more than its arithmetic; sums
-may be rearranged in it (fused multiply-add), while NaN and infinity keep their meaning.
+may be rearranged in it (fused multiply-add), while NaN and infinity keep their meaning. An `inlined` kernel is compiled as a part of the
+one that calls it, which spares the time to compile it by itself.
 """
 
 import os
@@ -33,6 +34,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 drop_stale_cache(Path(__file__).parent)
 
 kernel = njit(cache=True, error_model="numpy")
+inlined = njit(cache=True, error_model="numpy", inline="always")
 _BARE: dict[str, Any] = {"_nrt": False, "fastmath": {"contract", "arcp", "nsz", "reassoc"}}
 inner = njit(cache=True, error_model="numpy", **_BARE)
 part = njit(cache=True, error_model="numpy", inline="always")
