@@ -197,8 +197,7 @@ class PipeUnit:
 
     def _recover(self, state: Any) -> None:
         forces = self._pipe.section_forces(state)
-        wrench = np.concatenate([[forces.tension[-1]], forces.shear[-1], forces.moment[-1]])
-        end = self._pipe.spatial_top(state, wrench)
+        end = self._pipe.spatial(state, forces, -1)
         self._memo |= {
             "node_tension": forces.tension,
             "node_wall_tension": self._pipe.wall_tension(state, forces),
