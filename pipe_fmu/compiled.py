@@ -37,4 +37,4 @@ kernel = njit(cache=True, error_model="numpy")
 inlined = njit(cache=True, error_model="numpy", inline="always")
 _BARE: dict[str, Any] = {"_nrt": False, "fastmath": {"contract", "arcp", "nsz", "reassoc"}}
 inner = njit(cache=True, error_model="numpy", **_BARE)
-part = njit(cache=True, error_model="numpy", inline="always")
+inlined = njit(cache=True, error_model="numpy", inline="always")

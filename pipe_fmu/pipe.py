@@ -70,10 +70,10 @@ class Pipe:
         wrenches = section_forces.nodal_wrenches(self.line, self.mass, water, state.position, state.quaternion, *motion, state.strain)
         return SectionForces.of(wrenches)
 
-    def spatial_top(self, state: PipeState, wrench: Array) -> Array:
-        """Force and moment (6,), e, of material components (6,) at the top."""
-        r = np.array(matrix(tuple(state.quaternion[-1])))
-        return np.concatenate([r @ wrench[:3], r @ wrench[3:]])
+    def spatial(self, state: PipeState, forces: SectionForces, node: int) -> Array:
+        """Force and moment (6,), e, in the section at a node, on the line below it: at the top those that hold it."""
+        r = np.array(matrix(tuple(state.quaternion[node])))
+        return np.concatenate([r @ np.append(forces.tension[node], forces.shear[node]), r @ forces.moment[node]])
 
     def von_mises(self, state: PipeState, forces: SectionForces) -> Array:
         """Largest von Mises stress (n,) [Pa] over the wall at every node."""

@@ -12,7 +12,7 @@ which the line below the top answers with waves of its own.
 
 import numpy as np
 
-from .compiled import part
+from .compiled import inlined
 from .line import water_at
 from .step.integrator import search
 from .step.state import timed
@@ -21,7 +21,7 @@ DIVISOR = 3
 _MOST_WAITING = 64  # parts that wait to be done: two for each time that the step is divided, and one
 
 
-@part
+@inlined
 def divide(line, sea, state, velocity, spin, h, mobility, most, longest):
     """A step of h [s], whole if it converges, else in as few parts as do, none shorter than h / `most`, a power of three.
 

@@ -138,7 +138,7 @@ def unpacked(c):
 
 def state_size(n: int, added_mass: bool) -> int:
     """Numbers in the state of a unit of n nodes."""
-    return 4 + KINDS + 42 + N_WORKS + (3 + 4 + 3 + 3 + 18 + (3 if added_mass else 0)) * n + 7 * (n - 1)
+    return 4 + KINDS + 42 + N_WORKS + (3 + 4 + 3 + 3 + 18 + (3 if added_mass else 0)) * n + (7 + 4) * (n - 1)
 
 
 @kernel
@@ -157,7 +157,8 @@ def store(pipe, top, impedance, iterations, residual, told, out):
     at = _keep_table(pipe.before, out, at)
     at = _keep_table(pipe.earlier, out, at)
     at = _keep_table(pipe.added_mass_velocity, out, at)
-    _keep_table(pipe.strain, out, at)
+    at = _keep_table(pipe.strain, out, at)
+    _keep_table(pipe.chord, out, at)
 
 
 @kernel
@@ -192,7 +193,8 @@ def loaded(vector, n, added_mass):
     earlier, at = _table(vector, at, n, 6)
     added, at = _table(vector, at, n if added_mass else 0, 3)
     strain, at = _table(vector, at, n - 1, 7)
+    chord, at = _table(vector, at, n - 1, 4)
     pipe = PipeState(
-        vector[0], position, quaternion, velocity, rate, added, strain, last, before, earlier, vector[1], works
+        vector[0], position, quaternion, velocity, rate, added, strain, chord, last, before, earlier, vector[1], works
     )
     return Now(pipe, top, impedance, vector[2], vector[3], told)

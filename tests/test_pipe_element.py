@@ -44,7 +44,7 @@ def pose(bend, chord=(1.02 * LENGTH, 0.21, -0.34), seed=3):
 
 def strains(q1, q2, d, share):
     out = np.empty(element.ROWS)
-    element.strains(*element.frame(tuple(q1), tuple(q2), tuple(d)), LENGTH, share, out)
+    element.strains(*element.frame(tuple(q1), tuple(q2), tuple(d)), np.dot(d, d) - LENGTH**2, LENGTH, share, out)
     return out
 
 

@@ -78,7 +78,7 @@ def test_element_on_the_bed_has_the_gradient_of_its_potential():
         chord = d + x[6:9] - x[0:3]
         rm, u, psi = element.frame(tuple(a), tuple(b), tuple(chord))
         strain, rows = np.empty(7), np.empty((7, 9))
-        element.strains(rm, u, psi, h, share, strain)
+        element.strains(rm, u, psi, np.dot(u, u) - h * h, h, share, strain)
         element.gradients(rm, u, psi, h, share, rows)
         points, wide = np.empty((4, 2)), np.empty(12)
         lies = on_bed(), 0, h, z1 + x[2], z1 + d[2] + x[8], strain[6]

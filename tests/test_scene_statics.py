@@ -31,6 +31,10 @@ FLOATING = {
     "start": {"x": 780.0},
 }
 DEPARTING = FLOATING | {"start": {"x": 780.0, "departure": 1.1}}
+HALF_A_TURN = FLOATING | {  # from how the line hangs, one way or the other: all else lies in a plane
+    "environment": {"depth": 800.0}, "vessel": {"hang_off": [-40.0, 0.0, 5.0]}, "start": {"x": 780.0, "yaw": math.pi, "departure": 2.0},
+}  # fmt: skip
+BACKWARDS = ALONE | {"start": {"x": 780.0, "z": -800.0, "yaw": math.pi, "departure": 1.1}}
 TURNED_TOP = ALONE | {"environment": FLOATING["environment"], "pipe": ALONE["pipe"] | {"seabed": {}}}
 
 
@@ -50,7 +54,11 @@ def turned(mapping, angle):
 
 
 @pytest.mark.parametrize("degrees", [37.0, 90.0, 180.0, 270.0])
-@pytest.mark.parametrize("mapping", [ALONE, TURNED_TOP, FLOATING, DEPARTING], ids=["alone", "current and bed", "vessel", "departure"])
+@pytest.mark.parametrize(
+    "mapping",
+    [ALONE, TURNED_TOP, FLOATING, DEPARTING, HALF_A_TURN, BACKWARDS],
+    ids=["alone", "current and bed", "vessel", "departure", "half a turn", "backwards"],
+)
 def test_a_scene_turned_about_the_vertical_has_the_same_tensions_and_moments(mapping, degrees):
     angle = math.radians(degrees)
     before, after = (report(from_mapping(one, "turned")) for one in (mapping, turned(mapping, angle)))
@@ -64,6 +72,19 @@ def test_a_scene_turned_about_the_vertical_has_the_same_tensions_and_moments(map
         held = np.array(before["hold_force_N"])
         expected = [*turn.apply([*held[:2], 0.0])[:2], held[2]]
         assert_allclose(after["hold_force_N"], expected, atol=1e-6 * np.linalg.norm(held[:2]))
+
+
+@pytest.mark.parametrize("departure", [1.1, 2.0])
+def test_a_top_turned_by_half_a_turn_is_led_out_of_the_plane_the_same_way_whatever_round_off_says(departure):
+    """The least change of the heading decides between the two mirror images, each as good: here each is asked for by a hair."""
+    start = HALF_A_TURN["start"] | {"departure": departure}
+    scenes = [HALF_A_TURN | {"start": start | {"yaw": yaw}} for yaw in (math.pi, 3.14158, -3.14158)]
+    exact, more, less = (report(from_mapping(one, "hair")) for one in scenes)
+    mirror = np.array([-1.0, 1.0, -1.0])  # of a moment, in the plane of the line
+    size = np.linalg.norm(more["top_moment_e_N_m"])
+    assert_allclose(less["top_moment_e_N_m"], mirror * more["top_moment_e_N_m"], rtol=0.0, atol=1e-8 * size)
+    images = (np.array(one["top_moment_e_N_m"]) - exact["top_moment_e_N_m"] for one in (more, less))
+    assert min(np.linalg.norm(gap) for gap in images) < 1e-4 * size
 
 
 def test_a_held_top_is_pitched_first_and_then_turned_to_its_heading():

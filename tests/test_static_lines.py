@@ -163,17 +163,10 @@ def test_modules_float_above_the_bed_and_carry_their_part_of_the_line():
     assert found.position[middle, 2].min() < found.position[np.searchsorted(pipe.s, 800.0), 2]
     first = int(np.flatnonzero(clear)[0])
     carried = pipe.line.loads.weight[first:] @ pipe.line.length[first:]
-    force = pipe.section_forces(pipe.at_rest(found))
-    low = pipe.spatial_top(replace_top(pipe, found, first), np.array([force.tension[first], *force.shear[first], 0.0, 0.0, 0.0]))
+    state = pipe.at_rest(found)
+    low = pipe.spatial(state, pipe.section_forces(state), first)
     assert -found.top[2] + low[2] == pytest.approx(carried, rel=1e-3)
     assert found.position[:, 2].max() < 0.15
-
-
-def replace_top(pipe, found, node):
-    """State whose top section has the attitude of a node: turns the node's section force to e."""
-    quaternion = found.quaternion.copy()
-    quaternion[-1] = quaternion[node]
-    return pipe.at_rest(found._replace(quaternion=quaternion))
 
 
 def test_the_bed_under_modules_is_that_of_the_heaviest_section_or_of_the_weight_given():

@@ -100,7 +100,7 @@ def report(scene: Scene) -> dict[str, Any]:
     touchdown = None
     if at.pipe.seabed is not None:
         touchdown = _touchdown(pipe.s, found.position[:, 2], 0.125 * pipe.line.loads.bed.diameter)
-    top, foot = _without_noise(found.top), _without_noise(found.foot)
+    top, foot = _without_noise(pipe.spatial(state, forces, -1)), _without_noise(-pipe.spatial(state, forces, 0))
     return {
         "top_force_e_N": top[:3].tolist(),
         "top_moment_e_N_m": top[3:].tolist(),

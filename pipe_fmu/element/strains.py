@@ -39,6 +39,8 @@ delta u = nu + u x beta_m. A function f(u, psi) with gradients n, q so has the c
 
 import math
 
+import numpy as np
+
 from ..compiled import inner, kernel
 from ..maths.relative_rotation import chi_of, half_spin
 from ..maths.so3 import add, apply, apply_transposed, conjugate, cross, dot, log, matrix, multiply, root, scale
@@ -68,6 +70,27 @@ def inverted(position, quaternion):
     return False
 
 
+@kernel
+def chords(length, position):
+    """Chords of the elements (n - 1, 4), e, and the excess of their squares over those of the lengths.
+
+    A step adds to them what the nodes move (`growth`). From the positions of a line of a kilometre they would be known to 1e-13 m only, and
+    the extension, from the chord's length, to 1e-16: the tension does work on both.
+    """
+    out = np.empty((length.shape[0], 4))
+    for e in range(length.shape[0]):
+        d = chord(position.T, e, e + 1)
+        out[e, 0], out[e, 1], out[e, 2] = d
+        out[e, 3] = dot(d, d) - length[e] * length[e]
+    return out
+
+
+@inner
+def growth(d, dd):
+    """Growth of the square of a chord d by dd."""
+    return dot(dd, add(scale(2.0, d), dd))
+
+
 @inner
 def chord_shear(u, psi, h):
     """(s_2, s_3): sideways part of the chord over h, less what coiling does."""
@@ -85,17 +108,17 @@ def barrier(u):
 
 
 @inner
-def strains(rm, u, psi, h, share, out):
-    """Strains 0-5 and the sag 6 of one element into `out` (7,); `share` (2,) holds p_2, p_3."""
+def strains(rm, u, psi, excess, h, share, out):
+    """Strains 0-5 and the sag 6 of one element into `out` (7,); excess: of |u|^2 over h^2; `share` (2,) holds p_2, p_3."""
     z = dot(psi, psi)
     chi = chi_of(z)[0]
-    rho = 1.0 + z * chi
     along = dot(psi, u)
-    length = math.sqrt(rho * rho * dot(u, u) - chi * (rho + 1.0) * along * along)
+    longer = excess + chi * (2.0 + z * chi) * (z * dot(u, u) - along * along)  # l^2 - h^2
+    length = math.sqrt(h * h + longer)
     s2, s3 = chord_shear(u, psi, h)
     f, _ = barrier(u)
     b2, b3 = share[0] * s2, share[1] * s3
-    out[0] = (length - h) / h + 0.1 * f * (b2 * b2 + b3 * b3)
+    out[0] = longer / (h * (length + h)) + 0.1 * f * (b2 * b2 + b3 * b3)
     out[1] = f * s2  # eq. (17)
     out[2] = f * s3
     out[3] = (psi[0] + b2 * psi[1] + b3 * psi[2]) / h

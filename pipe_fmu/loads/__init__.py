@@ -86,7 +86,7 @@ def even_on_sag(loads, a, h):
 def _heights(e, old, new):
     """(z of the two nodes and sag) of element e before and after a step."""
     moves, _, new_strain = new
-    before = old[0][2, e], old[0][2, e + 1], old[5][STRAINS, e]
+    before = old[0][e], old[0][e + 1], old[5][STRAINS, e]
     return before, (before[0] + moves[2, e], before[1] + moves[2, e + 1], new_strain[STRAINS, e])
 
 
@@ -109,7 +109,7 @@ def add_mean_loads(line, water, first, count, step, middle, ends, gradients, wan
     """
     (h, old, new), (mean, final), (vector, matrix, scratch, sums) = step, gradients, into
     a, b = group(first), group(first + 1)
-    loads, moves, z = line.loads, new[0], old[0][2]
+    loads, moves, z = line.loads, new[0], old[0]
     weight.add_weight(line.length[a] * loads.weight[a], vector)
     if water.drag:
         depths = z[a] + 0.5 * moves[2, a], z[b] + 0.5 * moves[2, b]

@@ -11,7 +11,8 @@ make moments fourth-order accurate in motion as at rest, and forces, in motion, 
 - The element bends as a cubic. Between nodes that are far apart against the bending length sqrt(EI / T), a bar under tension T does not:
   with z = T h^2 / (4 EI) its end moments differ from the mean law EI kappa by the factors F = 3 (sqrt z coth sqrt z - 1) / z (both ends
   bent alike) and 15 (1 / F - 1) / z (bent to an S) of what the cubic says (exact bar under tension and linear load). Both are 1 for a short
-  element, and with EI the moment goes to zero. An element that is pushed keeps the cubic.
+  element, and with EI the moment goes to zero. An element that is pushed keeps the cubic. Forces stay as they are: those at the ends
+  of a line at rest are its reactions.
 
 Tension is the effective tension; the wall's own: results/wall_stress.py. Viscous stresses of internal damping are those of the rates of strain at
 the instant; numerical damping acts on the means over a step only, and is left out. So are the couples of rotary inertia (27) and rotational
@@ -188,7 +189,7 @@ def bar_factors(z):
 
 @inner
 def _tighten(tension, h, stiffness, rows, plain, ends):
-    """Give the ends of an element, `ends` (12,), the bending moments of a bar under tension, and the shear forces that go with them."""
+    """Give the ends of an element, `ends` (12,), the bending moments of a bar under tension."""
     r = _rows(rows)
     low = apply_transposed(r, (ends[3], ends[4], ends[5]))
     high = apply_transposed(r, (ends[9], ends[10], ends[11]))
@@ -199,9 +200,6 @@ def _tighten(tension, h, stiffness, rows, plain, ends):
     three = (by_mean - 1.0) * (0.5 * (high[2] - low[2]) - plain[2]), (by_shear - 1.0) * (0.5 * (high[2] + low[2]) - plain[5])
     _add(ends, 3, apply(r, (0.0, two[1] - two[0], three[1] - three[0])))
     _add(ends, 9, apply(r, (0.0, two[1] + two[0], three[1] + three[0])))
-    push = apply(r, (0.0, -2.0 * three[1] / h, 2.0 * two[1] / h))  # t_1 h x push = -2 (two[1] t_2 + three[1] t_3)
-    _add(ends, 0, scale(-1.0, push))
-    _add(ends, 6, push)
 
 
 @inner

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..line import Line, Water
-from ..maths.so3 import conjugate, exp, log, multiply, scale
+from ..maths.so3 import apply_transposed, conjugate, exp, log, matrix, multiply, scale
 from . import catenary
 from .balance import Balance, Factors, Pose, Scales
 from .relaxation import DESCENTS, relax
@@ -21,6 +21,7 @@ _LONGEST = 1.0 / 8.0  # of the way that the top is led, in one step,
 _SHORTEST = 1.0 / 512.0  # and the step at which the line may fall into another shape
 _FEW = 150  # steps of descent, while the step of the top can be shortened
 _TURN_OF_END = 0.35  # rad of the section at an end in one step
+_EITHER_WAY = 1e-6  # rad, within which a turn is half a turn
 _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])  # attitude of a clamped foot
 
 
@@ -71,7 +72,7 @@ def _turned(line: Line, water: Water, scales: Scales, result: Equilibrium, node:
     """Equilibrium with the section at one end turned to `attitude` (4,) from where it is."""
     held = tuple(float(x) for x in attitude)
     start = tuple(float(x) for x in result.quaternion[node])
-    turn = log(multiply(held, conjugate(start)))
+    turn = _least(log(multiply(held, conjugate(start))), start)
 
     def turned(at: Equilibrium, reached: float, wanted: float) -> Pose:
         quaternion = at.quaternion.copy()
@@ -79,6 +80,18 @@ def _turned(line: Line, water: Water, scales: Scales, result: Equilibrium, node:
         return at.position, quaternion
 
     return _led(line, water, scales, result, turned, min(1.0, _TURN_OF_END / max(math.hypot(*turn), _TURN_OF_END)))
+
+
+def _least(turn: tuple[float, ...], start: tuple[float, ...]) -> tuple[float, ...]:
+    """The rotation vector of the least turn from an attitude; of two that are half a turn either way, but for round-off, that which twists
+    the line first about t1 (else t2, t3) of the attitude, so that the line is led alike whatever the directions of the axes.
+    """
+    angle = math.hypot(*turn)
+    if angle < math.pi - _EITHER_WAY:
+        return turn
+    along = apply_transposed(matrix(start), turn)
+    leading = next(part for part in along if abs(part) > _EITHER_WAY)
+    return turn if leading > 0.0 else scale(1.0 - 2.0 * math.pi / angle, turn)
 
 
 def _hung(line: Line, water: Water, scales: Scales, s: Array, top: tuple[float, float, float]) -> Equilibrium:

@@ -5,7 +5,7 @@ import math
 from ..compiled import inner
 from ..element.assembly import add_matrix, add_vector, expand, expand_matrix
 from ..element.geometric_stiffness import geometric_stiffness
-from ..element.strains import ROWS, STRAINS, frame, gradients, resultant, strains
+from ..element.strains import ROWS, STRAINS, frame, gradients, growth, resultant, strains
 from ..loads import add_mean_loads, even_on_sag, lies, press_mean_sag
 from ..maths.so3 import add, dot, left_jacobian, scale
 from ..simd.columns import attitude, chord, vector_of
@@ -25,16 +25,16 @@ def add_elements(line, water, first, count, h, old, new, with_tangent, newton_fr
 
     Adds works to `sums` (len(WORKS),), and raises `peaks` (2,) to the largest force and moment at an end of an element.
     """
-    position, strain = old[0], old[5]
+    strain, chords = old[5], old[6]
     moves, turned, new_strain = new
     a, b = group(first), group(first + 1)
     length, share = line.length[a], (line.share[0, a], line.share[1, a])
     by_sag = lies(line.loads)
-    d, dd = chord(position, a, b), chord(moves, a, b)
+    d, dd = vector_of(chords, 0, a), chord(moves, a, b)
     mean, final, stress, nine, vector = grid(7, 9), grid(7, 9), row(7), row(9), row(12)
     square, twelve, ends, drags = grid(9, 9), grid(12, 12), grid(2, 6), (grid(3, 12), grid(3, 12))
     rm, u, psi = frame(attitude(turned[END], a), attitude(turned[END], b), add(d, dd))
-    strains(rm, u, psi, length, share, stress)
+    strains(rm, u, psi, chords[3, a] + growth(d, dd), length, share, stress)
     for k in range(ROWS):
         new_strain[k, a] = stress[k]
     if with_tangent:

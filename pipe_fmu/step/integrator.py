@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
-from ..compiled import kernel, part
-from ..element.strains import INSIDE_OUT, inverted
+from ..compiled import kernel, inlined
+from ..element.strains import INSIDE_OUT, chords, inverted
 from ..line import Line, Water
 from .energy import energies
 from .newton import solve_step
@@ -38,7 +38,8 @@ def rest(line: Line, position: Array, quaternion: Array, time: float) -> PipeSta
     element_strains(line, position, quaternion, strain)
     zero, still = np.zeros((n, 3)), np.zeros((n, 6))
     added_mass_velocity = np.zeros((len(line.added_mass), 3))
-    return PipeState(time, position, quaternion, zero, zero, added_mass_velocity, strain, still, still, still, 0.0, np.zeros(len(WORKS)))
+    moved = position, quaternion, zero, zero, added_mass_velocity, strain, chords(line.length, position)
+    return PipeState(time, *moved, still, still, still, 0.0, np.zeros(len(WORKS)))
 
 
 def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Array, h: float, mobility: Array = STIFF) -> StepResult:
@@ -50,7 +51,7 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     return StepResult(*search(line, water, state, velocity, spin, h, mobility))
 
 
-@part
+@inlined
 def search(line, water, state, velocity, spin, h, mobility):
     """A step by the first of the searches that ends in a configuration of a line; the fields of a StepResult."""
     spent, done, flaw = 0, False, 0

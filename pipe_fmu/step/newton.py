@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 
-from ..compiled import inner, kernel, part
+from ..compiled import inner, kernel, inlined
 from ..element.ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
-from ..element.strains import STRAINS
+from ..element.strains import STRAINS, growth
 from ..line import line_columns
 from ..maths.block_tridiagonal import SIZE, condense, factorize, substitute
-from ..simd.columns import take
+from ..maths.so3 import add
+from ..simd.columns import chord, take, vector_of
 from ..simd.lanes import larger
 from .nodes import advance
 from .state import WORKS, PipeState
@@ -81,7 +82,7 @@ def _made(line, old, x, residual, force, works):
     """Work of the free residual, which eqs. (78)-(80) of the step do not account for, over EXCHANGED of the works and the fall of the
     weight and STORED of the gravity and elastic energy before the step; line and `old` state in columns.
     """
-    n, held, z, strain = x.shape[0], SIZE if line.top_clamped else 3, old[0][2], old[5]
+    n, held, z, strain = x.shape[0], SIZE if line.top_clamped else 3, old[0], old[5]
     made, top, fall, stored = 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         for j in range(held if i == n - 1 else 0, SIZE):
@@ -100,7 +101,7 @@ def _made(line, old, x, residual, force, works):
     return math.fabs(made) / (EXCHANGED * exchanged + STORED * stored + _NOTHING)
 
 
-@part
+@inlined
 def solve_step(line, water, state, velocity, spin, h, mobility, weights, damped):
     """One step from a guess of its mean velocities: the sum of those of the last three steps times `weights`.
 
@@ -109,7 +110,8 @@ def solve_step(line, water, state, velocity, spin, h, mobility, weights, damped)
     """
     n = state.position.shape[0]
     ours = line_columns(line)
-    old, new = old_columns(state.position, state.quaternion, state.velocity, state.rate, state.added_mass_velocity, state.strain)
+    kept = state.velocity, state.rate, state.added_mass_velocity, state.strain, state.chord
+    old, new = old_columns(state.position, state.quaternion, *kept)
     x, top, works = np.empty((n, SIZE)), np.empty(SIZE), np.empty(len(WORKS))
     for k in range(3):
         top[k], top[3 + k] = h * velocity[k], h * spin[k]
@@ -136,12 +138,16 @@ def _advanced(line, h, state, old, new, x, force, works):
     advance(line, h, old, new[0], new[1], fields)
     position, last = np.empty_like(state.position), np.empty_like(x)
     quaternion, velocity, rate = np.empty_like(state.quaternion), np.empty_like(state.velocity), np.empty_like(state.rate)
-    added_mass_velocity, strain = np.empty_like(state.added_mass_velocity), np.empty_like(state.strain)
+    added_mass_velocity, strain, chords = np.empty_like(state.added_mass_velocity), np.empty_like(state.strain), np.empty_like(state.chord)
     for i in range(x.shape[0]):
         for k in range(3):
             position[i, k] = state.position[i, k] + x[i, k]
         for k in range(SIZE):
             last[i, k] = x[i, k] / h
+    for e in range(x.shape[0] - 1):
+        d, dd = vector_of(state.chord.T, 0, e), chord(x.T, e, e + 1)
+        chords[e, 0], chords[e, 1], chords[e, 2] = add(d, dd)
+        chords[e, 3] = state.chord[e, 3] + growth(d, dd)
     take(fields[0], quaternion)
     take(fields[1], velocity)
     take(fields[2], rate)
@@ -152,11 +158,11 @@ def _advanced(line, h, state, old, new, x, force, works):
         top_work += force[k] * x[-1, k]
     for k in range(works.shape[0]):
         works[k] += state.works[k]
-    moved = position, quaternion, velocity, rate, added_mass_velocity, strain
+    moved = position, quaternion, velocity, rate, added_mass_velocity, strain, chords
     return PipeState(state.time + h, *moved, last, state.last, state.before, top_work, works)
 
 
-@part
+@inlined
 def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scratch):
     """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (simd/columns.py).
 

@@ -88,7 +88,7 @@ def add_nodes(line, first, count, h, old, moves, turned, with_tangent, diagonal,
 @inner
 def _add_node(line, i, h, old, moves, turned, with_tangent, block, residual, works):
     """Inertia, rotational damping (material frame) and added mass of one node, or of a group."""
-    _, quaternion, velocity, rate, added_mass_velocity, _ = old
+    _, quaternion, velocity, rate, added_mass_velocity, _, _ = old
     tensor = grid(3, 3)
     theta = vector_of(moves, 3, i)
     r_old = matrix(attitude(quaternion, i))
@@ -150,7 +150,7 @@ def _add_added_mass(m, h, added_mass_velocity, r_mid, spin_t, arm, arm_new, move
 @inner
 def advance(line, h, old, moves, turned, new):
     """Columns `new` of attitudes, velocities, body rates and added-mass velocities after the increments; see step.system.assemble."""
-    _, quaternion, velocity, rate, added_mass_velocity, _ = old
+    _, quaternion, velocity, rate, added_mass_velocity, _, _ = old
     new_quaternion, new_velocity, new_rate, new_flow = new
     for first in range(0, line.mass.shape[0], WIDTH):
         i = group(first)

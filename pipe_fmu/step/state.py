@@ -31,6 +31,7 @@ class PipeState(NamedTuple):
     rate: Array  # (n, 3) angular velocity [rad/s], material
     added_mass_velocity: Array  # (n, 3) velocity of the added mass [m/s], material; (0, 3) when absent
     strain: Array  # (n - 1, 7) strains and sags
+    chord: Array  # (n - 1, 4) of the elements [m], e, and their excess [m^2]; see element.strains.chords
     last: Array  # (n, 6) mean velocities of the last step, for the extrapolation
     before: Array  # (n, 6) those of the step before
     earlier: Array  # (n, 6) and of the one before that
@@ -43,5 +44,5 @@ def timed(state, time):
     """The state, taken for that at `time` [s]."""
     return PipeState(
         time, state.position, state.quaternion, state.velocity, state.rate, state.added_mass_velocity, state.strain,
-        state.last, state.before, state.earlier, state.top_work, state.works,
+        state.chord, state.last, state.before, state.earlier, state.top_work, state.works,
     )  # fmt: skip

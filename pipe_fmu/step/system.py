@@ -22,9 +22,9 @@ import numpy as np
 
 from ..compiled import inner, kernel
 from ..element.assembly import clear
-from ..element.strains import ROWS, frame, strains
+from ..element.strains import ROWS, chords, frame, strains
 from ..line import line_columns
-from ..maths.so3 import exp, multiply, scale
+from ..maths.so3 import dot, exp, multiply, scale
 from ..simd.columns import attitude, chord, columns, fill, fill_straight, room, take, vector_of
 from ..simd.lane_arrays import group, row
 from ..simd.lanes import WIDTH, largest, total
@@ -44,28 +44,29 @@ def element_strains(line, position, quaternion, out):
     fill_straight(position, positions)
     for first in range(0, n - 1, WIDTH):
         a, b = group(first), group(first + 1)
-        rm, u, psi = frame(attitude(quaternions, a), attitude(quaternions, b), chord(positions, a, b))
-        one = row(7)
-        strains(rm, u, psi, line.length[a], (line.share[0, a], line.share[1, a]), one)
+        d, h, one = chord(positions, a, b), line.length[a], row(7)
+        rm, u, psi = frame(attitude(quaternions, a), attitude(quaternions, b), d)
+        strains(rm, u, psi, dot(d, d) - h * h, h, (line.share[0, a], line.share[1, a]), one)
         for k in range(ROWS):
             found[k, a] = one[k]
     take(found, out)
 
 
 @kernel
-def old_columns(position, quaternion, velocity, rate, added_mass_velocity, strain):
-    """Columns of the old state, and those that an assembly fills: increments, attitudes on the path, strains at its end."""
+def old_columns(position, quaternion, velocity, rate, added_mass_velocity, strain, chord):
+    """Columns of the old state (of positions, z alone), and those that an assembly fills: increments, attitudes on the path, strains at its
+    end.
+    """
     n = position.shape[0]
     p = room(n)
-    positions = np.empty((3, p))
-    fill_straight(position, positions)
     old = (
-        positions,
+        columns(position, n, 1.0)[2],
         columns(quaternion, n, 1.0),
         columns(velocity, n, 1.0),
         columns(rate, n, 1.0),
         columns(added_mass_velocity, n, 1.0),
         columns(strain, n, 1.0),
+        columns(chord, n, 1.0),
     )
     return old, (np.empty((6, p)), np.empty((4, 4, p)), np.empty((ROWS, p)))
 
@@ -95,7 +96,7 @@ def step_system(
     position, velocity (n, 3), quaternion (n, 4), rate (n, 3) body rates, added_mass_velocity (n, 3) or (0, 3) in the section's frame,
     strain (n - 1, 7): old state. Fills new_strain (n - 1, 7) and works (len(WORKS),). Returns (force scale [N], moment scale [N m]).
     """
-    old, new = old_columns(position, quaternion, velocity, rate, added_mass_velocity, strain)
+    old, new = old_columns(position, quaternion, velocity, rate, added_mass_velocity, strain, chords(line.length, position))
     scales = assemble(line_columns(line), water, h, old, new, x, with_tangent, newton_friction, system, works)
     take(new[2], new_strain)
     return scales

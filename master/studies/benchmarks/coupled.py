@@ -78,7 +78,7 @@ def _monolithic(changes: Sequence[str], times: np.ndarray) -> tuple[float, list[
         moment = next(moment for moment in moments if moment.time > t - 1e-9)
         spent += time.process_time() - begin
         forces = pipe.section_forces(moment.pipe)
-        top = pipe.spatial_top(moment.pipe, np.concatenate([[forces.tension[-1]], forces.shear[-1], forces.moment[-1]]))
+        top = pipe.spatial(moment.pipe, forces, -1)
         found.append((top[:3], top[3:], vessel.position(moment.vessel)))
     return spent, [np.array(values) for values in zip(*found, strict=True)]
 
