@@ -8,10 +8,12 @@ import math
 import numpy as np
 
 from . import validity
+from .arrays import Array
 from .compiled import kernel
 from .line import water_at
 from .maths.so3 import apply
 from .notes import DISCARD, WARNING, note
+from .parameters import PipeParameters
 from .pipe import Pipe
 from .results.end_forces import matrix_at
 from .results.section_forces import SectionForces, centreline_length, largest_bending_square, nodal_wrenches
@@ -63,9 +65,9 @@ def _sizes(n: int) -> tuple[dict[str, int], ...]:
 _DIRECT = sum(_sizes(0)[0].values())  # numbers of that group beside those at the nodes
 
 
-def output_places(n: int) -> dict[str, tuple[slice, int]]:
-    """Where in the outputs of a unit of n nodes a port's values lie, and the group they belong to."""
-    places, at = {}, 0
+def output_places(parameters: PipeParameters) -> dict[str, tuple[slice, int]]:
+    """Where in the outputs a port's values lie, and the group they belong to; the nodes of the parameters are placed."""
+    places, at, n = {}, 0, len(parameters.nodes_at)
     for group, sizes in enumerate(_sizes(n)):
         for port, size in sizes.items():
             places[port] = slice(at, at + size), group
@@ -208,3 +210,11 @@ def unit_start(constants, exported, exported_state, inputs, time, state, notes):
         state[i] = exported_state[i]
     state[0] = time
     return 0
+
+
+def values(parameters: PipeParameters) -> Array:
+    return np.zeros(0)
+
+
+def value_places(parameters: PipeParameters) -> dict[str, int]:
+    return {}

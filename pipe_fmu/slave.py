@@ -51,11 +51,24 @@ class PipeUnit:
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
         self._unit = native.unit_of(self._pipe)
-        self._constants, self._places = packed(self._unit), native.output_places(len(self._pipe.s))
+        self.constants, self._places = packed(self._unit), native.output_places(self._pipe.parameters)
         self._values_of: Any = None  # the state that the outputs are of
         self._values, self._known = np.empty(0), set[int]()
         self.remark = ""  # what the host's log should say of the start, or of the last step that was done; a line each
         self.state = self._stored(self._pipe.straight(), np.zeros(6), np.zeros((6, 6)), 0.0, QUIET)  # never changed, but replaced
+
+    @property
+    def parameters(self) -> PipeParameters:
+        """The parameters, with the nodes placed."""
+        return self._pipe.parameters
+
+    def compile(self) -> None:
+        """Run every kernel once."""
+        notes, numbers = np.zeros(SIZE), native.values(self.parameters)
+        native.unit_constants(self.constants, numbers, np.empty_like(self.constants), notes)
+        native.unit_start(self.constants, self.constants, self.state, np.zeros(N_INPUTS), 0.0, np.empty_like(self.state), notes)
+        self._stepped(0.0, 1e-3, np.zeros(N_INPUTS), notes)
+        native.unit_outputs(self.constants, self.state, 0, np.empty(max(part.stop for part, _ in self._places.values())))
 
     def _stored(self, state: PipeState, top: Array, impedance: Array, residual: float, told: Array) -> Array:
         out = np.empty(state_size(len(self._pipe.s), self._pipe.parameters.added_mass is not None))
@@ -142,7 +155,7 @@ class PipeUnit:
 
     def _stepped(self, time: float, h: float, inputs: Array, notes: Array) -> tuple[int, Array]:
         after = np.empty_like(self.state)
-        return native.unit_step(self._constants, inputs, time, h, self.state, after, notes), after
+        return native.unit_step(self.constants, inputs, time, h, self.state, after, notes), after
 
     def output(self, name: str) -> Array:
         """Values (size,) of a port, computed when first asked for in a state."""
@@ -151,7 +164,7 @@ class PipeUnit:
             size = max(part.stop for part, _ in self._places.values())
             self._values_of, self._values, self._known = self.state, np.empty(size), set()
         if group not in self._known:
-            native.unit_outputs(self._constants, self.state, group, self._values)
+            native.unit_outputs(self.constants, self.state, group, self._values)
             self._known.add(group)
         return self._values[place]
 

@@ -23,7 +23,7 @@ class VesselUnit:
 
     def __init__(self, parameters: VesselParameters) -> None:
         self.parameters = parameters
-        self._constants = native.constants(parameters)
+        self.constants = native.constants(parameters)
         self._places = native.output_places(parameters)
         self._notes = blank()
         self._start, self._said_of_it = native.started(parameters)
@@ -36,6 +36,14 @@ class VesselUnit:
         force = 0.1 * mass
         return {"m": parameters.environment.depth, "m/s": 1.0, "rad": 0.1, "rad/s": 1.0 / arm, "N": force, "N.m": force * arm, "J": mass}
 
+    def compile(self) -> None:
+        """Run every kernel once."""
+        notes, state, given = blank(), self.state.copy(), np.zeros(native.N_INPUTS)
+        native.unit_constants(self.constants, native.values(self.parameters), np.empty_like(self.constants), notes)
+        native.unit_start(self.constants, self.constants, self.state, given, 0.0, state, notes)
+        native.unit_step(self.constants, given, 0.0, 1e-3, state, np.empty_like(state), notes)
+        native.unit_outputs(self.constants, state, 0, np.empty(native.N_OUTPUTS))
+
     def initialize(self, time: float, inputs: dict[str, Array]) -> str | None:
         """Take the pose, velocity and hold thrust of the parameters; never fails."""
         self.state, self.remark = self._start, "\n".join(self._said_of_it)
@@ -44,7 +52,7 @@ class VesselUnit:
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
         """Step from `time`, s, by h, s; a message and the state unchanged if Newton did not converge."""
         given, after = np.concatenate([inputs[name] for name in self.INPUTS]), np.empty(native.N_STATE)
-        status = native.unit_step(self._constants, given, time, h, self.state, after, self._notes)
+        status = native.unit_step(self.constants, given, time, h, self.state, after, self._notes)
         said = "\n".join(texts(self._notes, native.MESSAGES))
         if status != 0:
             return said
@@ -66,5 +74,5 @@ class VesselUnit:
         part, group = self._places[name]
         if self._outputs is None:
             self._outputs = np.empty(native.N_OUTPUTS)
-            native.unit_outputs(self._constants, self._state, group, self._outputs)
+            native.unit_outputs(self.constants, self._state, group, self._outputs)
         return self._outputs[part]

@@ -78,7 +78,7 @@ class Recipe:
     @property
     def digest(self) -> str:
         """Hash of everything the FMU's content follows from."""
-        facts = {"about": _about(self), **_content(self)}
+        facts = {"about": about(self), **content(self)}
         return _digest({"bundle": self.bundle, "facts": json.dumps(facts, sort_keys=True)})
 
 
@@ -92,9 +92,8 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
     with tempfile.TemporaryDirectory(prefix="fmu_") as folder, _clean_imports():
         script, configuration = Path(folder, f"{recipe.bundle}_entry.py"), Path(folder, "fmu.json")
         shutil.copy(HERE / "entry.py", script)
-        about = {**_about(recipe), "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, recipe.digest))}
-        content = {"about": about, **_content(recipe)}
-        configuration.write_text(json.dumps(content, indent=1), encoding="utf-8")
+        facts = {"about": {**about(recipe), "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, recipe.digest))}, **content(recipe)}
+        configuration.write_text(json.dumps(facts, indent=1), encoding="utf-8")
         bundle = Path(folder, recipe.bundle)
         for name, text in _sources(recipe).items():
             target = bundle / name
@@ -154,7 +153,8 @@ def _compiler() -> str:
     return hashlib.sha256(repr((sys.version, numba.__version__, host, settings)).encode()).hexdigest()[:12]
 
 
-def _about(recipe: Recipe) -> dict[str, str]:
+def about(recipe: Recipe) -> dict[str, str]:
+    """What the model description says of an FMU."""
     try:
         version = importlib.metadata.version("pipelay")
     except importlib.metadata.PackageNotFoundError:
@@ -163,7 +163,8 @@ def _about(recipe: Recipe) -> dict[str, str]:
     return about | ({"description": recipe.description} if recipe.description else {})
 
 
-def _content(recipe: Recipe) -> dict[str, Any]:
+def content(recipe: Recipe) -> dict[str, Any]:
+    """What an FMU is made with: parameters, experiment, inputs, nominal values."""
     parts = {"experiment": recipe.experiment, "inputs": recipe.inputs, "nominal": recipe.nominal}
     return {"parameters": recipe.parameters} | {name: dict(part) for name, part in parts.items()}
 
@@ -199,8 +200,8 @@ def _finish(recipe: Recipe, raw: Path, finished: Path) -> None:
         foreign = [name for name in source.namelist() if name.startswith("binaries/") and not name.startswith(LINUX)]
         contents = {name: source.read(name) for name in source.namelist() if name not in foreign}  # PythonFMU's, which find no Python
     model = ElementTree.fromstring(contents["modelDescription.xml"])
-    about = recipe.package / "about.html"
-    contents["documentation/index.html"] = page_html(model, about.read_text(encoding="utf-8") if about.is_file() else "").encode()
+    text = recipe.package / "about.html"
+    contents["documentation/index.html"] = page_html(model, text.read_text(encoding="utf-8") if text.is_file() else "").encode()
     contents["model.png"] = icon_png()
     for name in (name for name in contents if name.startswith(LINUX)):
         contents[name] = loader.library(cache_folder("loaders"))

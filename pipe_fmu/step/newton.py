@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..compiled import inner, kernel, inlined
+from ..compiled import inlined, inner, kernel
 from ..element.ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
 from ..element.strains import STRAINS, growth
 from ..line import line_columns

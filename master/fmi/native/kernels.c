@@ -62,8 +62,25 @@ enum { N_CONSTANTS, N_STATE, N_INPUTS, N_OUTPUTS, N_PARAMETERS, N_SIZES };
 KERNELS(base)
 #ifdef LEVELS
 KERNELS(v3)
-#define V3 (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2"))
-#define CALL(kernel, ...) (V3 ? kernel_##kernel##_v3(__VA_ARGS__) : kernel_##kernel##_base(__VA_ARGS__))
+#include <cpuid.h>
+#include <stdatomic.h>
+
+/* Whether processor and system know AVX2, FMA and BMI2. Found out once, as virtual machines take long over the question. */
+static int has_v3(void) {
+    static atomic_int known; /* 0: not yet, 1: no, 2: yes */
+    int answer = atomic_load_explicit(&known, memory_order_relaxed);
+    if (!answer) {
+        unsigned a, b = 0, c = 0, d, low = 0, high;
+        int there = __get_cpuid(1, &a, &b, &c, &d) && (c & bit_FMA) && (c & bit_OSXSAVE) && (c & bit_AVX);
+        if (there) __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+        there = there && (low & 6) == 6 && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & bit_AVX2) && (b & bit_BMI2) && (b & bit_BMI);
+        answer = there ? 2 : 1;
+        atomic_store_explicit(&known, answer, memory_order_relaxed);
+    }
+    return answer == 2;
+}
+
+#define CALL(kernel, ...) (has_v3() ? kernel_##kernel##_v3(__VA_ARGS__) : kernel_##kernel##_base(__VA_ARGS__))
 #else
 #define CALL(kernel, ...) kernel_##kernel##_base(__VA_ARGS__)
 #endif

@@ -7,10 +7,7 @@ module, which LLVM turns into an object file for each platform; zig's C compiler
 from __future__ import annotations
 
 import hashlib
-import os
 import re
-import subprocess
-import sys
 import tempfile
 import zlib
 from collections.abc import Iterable
@@ -24,12 +21,13 @@ from llvmlite import binding
 
 from ...errors import RunError
 from ...process.locks import locked
+from . import windows, zig
 
 HERE = Path(__file__).parent
-SOURCES = ("face.c", "unit.c", "kernels.c", "face.h")
+SOURCES = ("face.c", "unit.c", "kernels.c", "face.h", "windows.c", "windows.py")
 KERNELS = ("constants", "start", "step", "outputs")
 NEEDED = re.compile(r"NRT_\w+|numba_attempt_nocopy_reshape|release_reference|llvm\..*|sqrt|tan|atan|atan2|tanh|hypot|sin|cos|exp|expm1|log|floor|pow|cosh|sinh|asin|acos|asinh|acosh|atanh|mem(cpy|set|move)")
-FLAGS = ("-std=c11", "-O2", "-fPIC", "-fvisibility=hidden", "-shared", "-s", "-ffp-contract=off")
+FLAGS = ("-std=c11", "-O2", "-fvisibility=hidden", "-shared", "-s", "-ffp-contract=off")
 _RELEASE = "llvm.x86.atomic.sub.cc.i64"  # the one instruction of x86 in numba's code
 
 
@@ -131,11 +129,8 @@ def library(machine: Machine, platform: Platform, name: str, key: str, folder: P
 def _link(platform: Platform, objects: list[Path], made: Path, folder: Path) -> None:
     """Compile the C face and link it. Raises RunError with the compiler's words where it fails."""
     several = ["-DLEVELS"] if len(objects) > 1 else []
-    sources = [str(HERE / source) for source in SOURCES if source.endswith(".c")]
-    command = [sys.executable, "-P", "-m", "ziglang", "cc", "-target", platform.target, *FLAGS, *several]
-    caches = {"ZIG_GLOBAL_CACHE_DIR": str(folder / "zig"), "ZIG_LOCAL_CACHE_DIR": str(folder / "zig")}
-    arguments = [*command, "-o", str(made), *sources, *map(str, objects), *([] if platform.ending == "dll" else ["-lm"])]
+    sources = [str(HERE / source) for source in SOURCES if source.endswith(".c") and source != "windows.c"]
+    end = windows.arguments(made.parent) if platform.ending == "dll" else ["-fPIC", "-lm"]
+    command = [*zig.COMMAND, "cc", "-target", platform.target, *FLAGS, *several, "-o", str(made), *sources, *map(str, objects), *end]
     with locked(folder):
-        done = subprocess.run(arguments, env=os.environ | caches, capture_output=True, text=True)
-    if done.returncode:
-        raise RunError(f"the FMU's library for {platform.folder} cannot be made: {' '.join(done.stderr.split())[:1000]}")
+        zig.run(command, folder, f"the FMU's library for {platform.folder} cannot be made")
