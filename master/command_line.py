@@ -81,8 +81,8 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--scene", default="paper", metavar="SCENE", help="scene the FMUs belong to (default: paper)")
     _set_argument(export)
     export.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path(), help="folder (default: here)")
-    portable = "put Python and compiled kernels into the FMUs, for machines without them (Linux x86-64; 100 MB each)"
-    export.add_argument("--portable", action="store_true", help=portable)
+    python = "make FMUs that are run by a Python with numpy and numba on the machine (Linux), not machine code: for changed models"
+    export.add_argument("--python", action="store_true", help=python)
 
     command(
         "scenes", "List the built-in scenes.", "Copy one of their files for a scene of your own; `pipelay keys` lists what it may say."

@@ -14,6 +14,8 @@ def main(resources: str, step: float) -> None:
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
     slave.do_step(0.0, step)
+    if compile_all := getattr(slave.unit, "compile", None):
+        compile_all()
     slave.get_real([i for i, variable in enumerate(slave.variables()) if variable.causality == "output" and variable.kind == "Real"])
 
 

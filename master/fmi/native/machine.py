@@ -39,16 +39,16 @@ class Platform:
     ending: str
     triple: str
     target: str
-    levels: dict[str, str]  # "base" and, where the library chooses, "v3": names of processors
+    levels: tuple[tuple[str, str], ...]  # "base" and, where the library chooses, "v3", with LLVM's names of processors
 
 
-_X86 = {"base": "x86-64-v2", "v3": "x86-64-v3"}
+_X86 = (("base", "x86-64-v2"), ("v3", "x86-64-v3"))
 PLATFORMS = (
     Platform("linux64", "so", "x86_64-unknown-linux-gnu", "x86_64-linux-gnu.2.17", _X86),
     Platform("win64", "dll", "x86_64-pc-windows-gnu", "x86_64-windows-gnu", _X86),
     Platform("darwin64", "dylib", "x86_64-apple-macosx11.0.0", "x86_64-macos", _X86),
 )
-ARM = Platform("aarch64-linux", "so", "aarch64-unknown-linux-gnu", "aarch64-linux-gnu.2.17", {"base": "generic"})
+ARM = Platform("aarch64-linux", "so", "aarch64-unknown-linux-gnu", "aarch64-linux-gnu.2.17", (("base", "generic"),))
 
 
 def own_platform() -> Platform:
@@ -92,7 +92,7 @@ class Machine:
         binding.initialize_all_targets()
         binding.initialize_all_asmprinters()
         target = binding.Target.from_triple(platform.triple)
-        machine = target.create_target_machine(cpu=platform.levels[level], features="", opt=3, reloc="pic", codemodel="default")
+        machine = target.create_target_machine(cpu=dict(platform.levels)[level], features="", opt=3, reloc="pic", codemodel="default")
         text = re.sub(r'target triple = "[^"]*"', f'target triple = "{platform.triple}"', self._text)
         module = binding.parse_assembly(re.sub(r'target datalayout = "[^"]*"', f'target datalayout = "{machine.target_data}"', text))
         for name, kernel in self._names.items():
@@ -116,7 +116,7 @@ def library(machine: Machine, platform: Platform, name: str, key: str, folder: P
         folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as work:
         objects = []
-        for level in platform.levels:
+        for level, _ in platform.levels:
             objects.append(Path(work, f"{level}.o"))
             objects[-1].write_bytes(machine.object_file(platform, level))
         made, packed = Path(work, f"unit.{platform.ending}"), Path(work, "packed")
