@@ -187,8 +187,7 @@ def _parameter(value: Any, about: Mapping[str, Any], place: int = 0) -> Paramete
     lowest, highest = about.get("min", about.get("above")), about.get("max", about.get("below"))
     units = about.get("unit", "") if kind == "Real" else ""  # FMI gives units to reals only
     unit = units if isinstance(units, str) else units[place]
-    strict = {"above": "above" in about, "below": "below" in about}
-    return Parameter(kind, value, unit, lowest, highest, about.get("doc", ""), **strict)
+    return Parameter(kind, value, unit, lowest, highest, about.get("doc", ""), above="above" in about, below="below" in about)
 
 
 def _items(hint: Any) -> tuple[str, ...]:

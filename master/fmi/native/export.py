@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib
 import json
@@ -41,7 +42,7 @@ def native_fmu(recipe: Recipe, unit_class: type[Any], platforms: Sequence[Platfo
     unit = unit_class(schema.build(unit_class.PARAMETERS, recipe.parameters))
     unit.compile()
     native = importlib.import_module(f"{unit_class.__module__.rpartition('.')[0]}.native")
-    machine = _Once(native)
+    machine = functools.cache(functools.partial(Machine, native))  # made when a library is not kept
     libraries = {p: library(machine, p, recipe.name, recipe.bundle, cache_folder("libraries")) for p in platforms}
     files = {f"binaries/{p.folder}/{recipe.name}.{p.ending}": made for p, made in libraries.items()}
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -51,19 +52,6 @@ def native_fmu(recipe: Recipe, unit_class: type[Any], platforms: Sequence[Platfo
     if destination is None:
         cache.bound()
     return place
-
-
-class _Once:
-    """Makes a Machine when it is first asked for an object file: libraries that are kept need none."""
-
-    def __init__(self, native: ModuleType) -> None:
-        self._native = native
-        self._machine: Machine | None = None
-
-    def object_file(self, platform: Platform, level: str) -> bytes:
-        """See Machine."""
-        self._machine = self._machine or Machine(self._native)
-        return self._machine.object_file(platform, level)
 
 
 def _digest(recipe: Recipe, platforms: Sequence[Platform]) -> str:
@@ -146,8 +134,19 @@ def _parameter(name: str, slave: UnitSlave, places: Mapping[str, int], numbers: 
     if own not in places:
         numbers.append(float(slave.ports.as_number(name, it.value)))
     index = places.get(own, len(numbers) - 1)
-    bounds = {"minimum": it.minimum, "maximum": it.maximum, "above": it.above, "below": it.below}
-    return Row(name, "parameter", kind, index, rule=it.rule, fixed=own not in places, items=it.items, **bounds)
+    return Row(
+        name,
+        "parameter",
+        kind,
+        index,
+        rule=it.rule,
+        minimum=it.minimum,
+        maximum=it.maximum,
+        above=it.above,
+        below=it.below,
+        fixed=own not in places,
+        items=it.items,
+    )
 
 
 def _write(path: Path, files: Mapping[str, bytes]) -> None:

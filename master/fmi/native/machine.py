@@ -10,7 +10,7 @@ import hashlib
 import re
 import tempfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -106,7 +106,7 @@ class Machine:
         return bytes(machine.emit_object(module))
 
 
-def library(machine: Machine, platform: Platform, name: str, key: str, folder: Path) -> bytes:
+def library(machine: Callable[[], Machine], platform: Platform, name: str, key: str, folder: Path) -> bytes:
     """The shared library of a unit for a platform, kept in `folder` by the hash `key` of its package. Raises RunError."""
     facts = repr((key, platform, FLAGS, numba.__version__, llvmlite.__version__)).encode() + b"".join((HERE / s).read_bytes() for s in SOURCES)
     place = folder / f"{name}_{platform.folder}_{hashlib.sha256(facts).hexdigest()[:12]}.z"
@@ -118,7 +118,7 @@ def library(machine: Machine, platform: Platform, name: str, key: str, folder: P
         objects = []
         for level, _ in platform.levels:
             objects.append(Path(work, f"{level}.o"))
-            objects[-1].write_bytes(machine.object_file(platform, level))
+            objects[-1].write_bytes(machine().object_file(platform, level))
         made, packed = Path(work, f"unit.{platform.ending}"), Path(work, "packed")
         _link(platform, objects, made, folder)
         packed.write_bytes(zlib.compress(made.read_bytes()))
