@@ -31,7 +31,9 @@ def fuzz(lib, resources, seconds, seed):
 def one(dice, it, other, states, now):
     """One call, right or wrong."""
     kind, n = dice.choice(("Real", "Integer", "Boolean", "String")), dice.randrange(4)
-    references = [dice.choice((dice.randrange(len(ROWS)), 2**32 - 1)) if dice.random() < 0.1 else dice.randrange(len(ROWS)) for _ in range(n)]
+    references = [
+        dice.choice((dice.randrange(len(ROWS)), 2**32 - 1)) if dice.random() < 0.1 else dice.randrange(len(ROWS)) for _ in range(n)
+    ]
     whole = [dice.choice((0, 1, 2, 5, -1, 2**31 - 1, -(2**31))) for _ in references]
     values = {"Real": dice.choices(NUMBERS, k=n), "String": dice.choices(("", "x", "50 % Öl", "%s%n" * 99), k=n)}.get(kind, whole)
     state = dice.choice(states)

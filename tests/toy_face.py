@@ -23,6 +23,7 @@ FLAGS = ("-std=c11", "-O2", "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", 
 LINUX = "x86_64-linux-gnu.2.17"
 OK, WARNING, DISCARD, ERROR = range(4)
 GUID = "{toy}"
+TYPES: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
 LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 MESSAGES = (
     "stiffness = %g: breaks the spring",
@@ -73,7 +74,10 @@ def compiled(target: str = LINUX, *flags: str, sources: Sequence[Path] = SOURCES
         zig = dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(CACHE / "zig"))
         made = place.with_suffix(f".{os.getpid()}")
         done = subprocess.run(
-            [*command, "-o", made, *sources, *(() if "windows" in target else ("-lm",))], env=os.environ | zig, capture_output=True, text=True
+            [*command, "-o", made, *sources, *(() if "windows" in target else ("-lm",))],
+            env=os.environ | zig,
+            capture_output=True,
+            text=True,
         )
         assert done.returncode == 0, done.stderr
         made.replace(place)
@@ -93,10 +97,11 @@ def library(path: Path | None = None) -> ctypes.CDLL:
     types: dict[str, list[Any]] = {
         "Instantiate": [c_char_p, c_int, c_char_p, c_char_p, POINTER(Callbacks), c_int, c_int],
         "FreeInstance": [pointer], "SetupExperiment": [pointer, c_int, c_double, c_double, c_int, c_double],
-        **{name: [pointer] for name in ("EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset", "CancelStep", "EnterEventMode")},
+        **{name: [pointer] for name in ("EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset")},
+        **{name: [pointer] for name in ("CancelStep", "EnterEventMode")},
         "DoStep": [pointer, c_double, c_double, c_int],
         **{f"{verb}{kind}": [pointer, *many, POINTER(kind_type)] for verb in ("Get", "Set")
-           for kind, kind_type in (("Real", c_double), ("Integer", c_int), ("Boolean", c_int), ("String", c_char_p))},
+           for kind, kind_type in TYPES.items()},
         "GetFMUstate": [pointer, POINTER(c_void_p)], "SetFMUstate": [pointer, c_void_p], "FreeFMUstate": [pointer, POINTER(c_void_p)],
         "SerializedFMUstateSize": [pointer, c_void_p, POINTER(c_size_t)], "SerializeFMUstate": [pointer, c_void_p, c_char_p, c_size_t],
         "DeSerializeFMUstate": [pointer, c_char_p, c_size_t, POINTER(c_void_p)],
@@ -142,12 +147,12 @@ class Toy:
     def set(self, kind: str, *pairs: tuple[int, Any]) -> int:
         """Status of setting (value reference, value)."""
         values = [value.encode() if isinstance(value, str) else value for _, value in pairs]
-        array = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}[kind] * len(pairs)
+        array = TYPES[kind] * len(pairs)
         return self.call(f"Set{kind}", (c_uint * len(pairs))(*(r for r, _ in pairs)), len(pairs), array(*values))
 
     def get(self, kind: str, *references: int) -> Any:
         """Their values, or the status where that is no success."""
-        array = ({"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}[kind] * len(references))()
+        array = (TYPES[kind] * len(references))()
         status = self.call(f"Get{kind}", (c_uint * len(references))(*references), len(references), array)
         return list(array) if status == OK else status
 
