@@ -166,8 +166,13 @@ def test_10000_instances_leave_no_memory(lib, resources):
         for _ in range(n):
             it = Toy(lib, resources, mute=True).ready()
             it.step(0.0, 0.1)
-            it.state()
+            it.state()  # freed with the instance
+            it.call("FreeFMUstate", byref(it.state()))
             it.free()
+        it = Toy(lib, resources, mute=True)
+        for _ in range(20 * n):
+            it.call("FreeFMUstate", byref(it.state()))
+        it.free()
         lines = Path("/proc/self/status").read_text().splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
 
@@ -301,6 +306,12 @@ def test_refuses_a_step_and_stands_where_it_stood(toy, time, step, status, words
     assert toy.log == [(status, {DISCARD: "logStatusDiscard", ERROR: "logStatusError"}[status], words)]
     assert toy.get("Real", POSITION, VELOCITY, STEPS) == [*START, 0.0]
     assert toy.step(5e-8, 0.1) == OK  # hosts add up their time in ways of their own
+
+
+def test_a_late_time_may_be_off_by_its_round_off(toy):
+    toy.ready(start=1e6)
+    assert toy.step(1e6 + 2e-6, 1e-5) == DISCARD
+    assert toy.step(1e6 + 5e-7, 1e-5) == OK
 
 
 def test_an_input_that_is_not_finite_discards_the_step(toy):
