@@ -80,7 +80,7 @@ def unit_file(
     n_outputs: int,
     n_groups: int,
 ) -> bytes:
-    """The bytes of unit.bin for a unit with these vectors, as exported (`inputs`: start values). Raises ValueError for what does not fit."""
+    """The bytes of unit.bin of a unit with these vectors, as exported (`inputs`: start values). Raises ValueError where they do not fit."""
     vectors = [np.asarray(vector, "<f8").ravel() for vector in (constants, state, inputs, parameters)]
     if len(guid.encode()) > LONGEST_GUID:
         raise ValueError(f"guid = {guid!r:.80}: must have at most {LONGEST_GUID} bytes")
@@ -96,7 +96,16 @@ def unit_file(
     places = [texts.place(message) for message in messages]
     about = [texts.place(guid), texts.place(name)]
     pool = texts.bytes()
-    counts = [*(vector.size for vector in vectors[:3]), n_outputs, vectors[3].size, n_groups, len(variables), len(places), len(pool), *about]
+    counts = [
+        *(vector.size for vector in vectors[:3]),
+        n_outputs,
+        vectors[3].size,
+        n_groups,
+        len(variables),
+        len(places),
+        len(pool),
+        *about,
+    ]
     data = b"".join(vector.tobytes() for vector in vectors)
     return b"".join([MAGIC, struct.pack("<11q", *counts), data, rows, struct.pack(f"<{len(places)}q", *places), pool])
 
