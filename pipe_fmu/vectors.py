@@ -1,7 +1,7 @@
 """The pipe's constants and its state as plain vectors, and back: the order of what lies in them, once.
 
-Constants: HEAD counts, the time-independent numbers of a unit, then the arrays of the mesh, line, sea, walls and limits. State: numbers, then
-the arrays of a PipeState. Kernels take slices, and copy nothing.
+Constants: HEAD counts, the numbers of a unit, then the arrays of its mesh, line, sea, walls and limits. State: numbers, then the arrays of
+a PipeState. Kernels take slices, and copy nothing.
 """
 
 from typing import NamedTuple

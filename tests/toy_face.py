@@ -5,21 +5,20 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from typing import Any
 
+from master.fmi.native import windows, zig
 from master.fmi.native.tables import Row, unit_file
 
 HERE = Path(__file__).parent
 NATIVE = HERE.parent / "master" / "fmi" / "native"
 CACHE = Path(tempfile.gettempdir(), f"pipelay_toy_face_{os.getuid()}")
 SOURCES = [NATIVE / "face.c", NATIVE / "unit.c", HERE / "toy_unit.c"]
-FLAGS = ("-std=c11", "-O2", "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror", "-shared", "-s")
+FLAGS = ("-std=c11", "-O2", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror", "-shared", "-s")
 LINUX = "x86_64-linux-gnu.2.17"
 OK, WARNING, DISCARD, ERROR = range(4)
 GUID = "{toy}"
@@ -66,21 +65,16 @@ def toy_file(rows: Sequence[Row] = ROWS, guid: str = GUID) -> bytes:
 
 def compiled(target: str = LINUX, *flags: str, sources: Sequence[Path] = SOURCES) -> Path:
     """The library for `target`, compiled once for these sources and flags."""
-    command = [sys.executable, "-P", "-m", "ziglang", "cc", "-target", target, *FLAGS, *flags]
+    command = [*zig.COMMAND, "cc", "-target", target, *FLAGS, *flags]
     contents = [source.read_bytes() for source in [*sources, NATIVE / "face.h"]]
     place = CACHE / f"{hashlib.sha256(b''.join(contents) + repr(command[1:]).encode()).hexdigest()[:16]}.so"
     if not place.exists():
         CACHE.mkdir(parents=True, exist_ok=True)
-        zig = dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(CACHE / "zig"))
-        made = place.with_suffix(f".{os.getpid()}")
-        done = subprocess.run(
-            [*command, "-o", made, *sources, *(() if "windows" in target else ("-lm",))],
-            env=os.environ | zig,
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, done.stderr
-        made.replace(place)
+        with tempfile.TemporaryDirectory(dir=CACHE) as work:
+            made = Path(work, "made")
+            end = windows.arguments(Path(work)) if "windows" in target else ["-fPIC", "-lm"]
+            zig.run([*command, "-o", str(made), *map(str, sources), *end], CACHE, "the toy unit does not compile")
+            made.replace(place)
     return place
 
 

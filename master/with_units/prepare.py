@@ -1,7 +1,7 @@
 """The process that prepares a run: checks the scene's units, finds the equilibrium, writes the FMUs.
 
 Reads the scene as JSON from standard input; `--export DIR` writes pipe.fmu and vessel.fmu there, for all platforms, else they go to a cache
-by content, for this one; with `--python` they are run by Python instead of being machine code. Prints one JSON object: fmus; or error, exit.
+by content, for this one; with `--python` they are run by Python instead of being machine code. Prints JSON: fmus; or error, exit.
 """
 
 from __future__ import annotations

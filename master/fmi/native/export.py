@@ -33,8 +33,8 @@ _OWN = (*SOURCES, "machine.py", "export.py", "tables.py")
 def native_fmu(recipe: Recipe, unit_class: type[Any], platforms: Sequence[Platform], destination: Path | None) -> Path:
     """The FMU of `recipe` in machine code for `platforms`, in the file `destination`, or in a cache by content.
 
-    unit_class: the recipe's unit, of a package whose module `native` has its kernels. Raises ValueError for parameters that the unit refuses,
-    RunError where a library cannot be made or the unit does not start.
+    unit_class: the recipe's unit, of a package whose module `native` has its kernels. Raises ValueError for parameters that the unit
+    refuses, RunError where a library cannot be made or the unit does not start.
     """
     place = destination or cache_folder("fmus") / f"{recipe.name}_{_digest(recipe, platforms)}.fmu"
     if destination is None and cache.used(place) and zipfile.is_zipfile(place):

@@ -1,7 +1,7 @@
 """Kernels as machine code for any platform: from what numba has compiled for this one, by LLVM and zig, without a compiler installed.
 
-numba keeps the intermediate code of every kernel that it compiles. That of a unit's four kernels (`native.py` of its package) is put into one
-module, which LLVM turns into an object file for each platform; zig's C compiler links it with the C face (face.c, unit.c, kernels.c).
+numba keeps the intermediate code of every kernel that it compiles. That of a unit's four kernels (`native.py` of its package) is put into
+one module, which LLVM turns into an object file for each platform; zig's C compiler links it with the C face (face.c, unit.c, kernels.c).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import hashlib
 import re
 import tempfile
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,8 @@ from . import windows, zig
 HERE = Path(__file__).parent
 SOURCES = ("face.c", "unit.c", "kernels.c", "face.h", "windows.c", "windows.py")
 KERNELS = ("constants", "start", "step", "outputs")
-NEEDED = re.compile(r"NRT_\w+|numba_attempt_nocopy_reshape|release_reference|llvm\..*|sqrt|tan|atan|atan2|tanh|hypot|sin|cos|exp|expm1|log|floor|pow|cosh|sinh|asin|acos|asinh|acosh|atanh|mem(cpy|set|move)")
+_MATH = "sqrt|hypot|pow|fmod|floor|exp|expm1|log|log10|a?(sin|cos|tan)h?|atan2|sincos"
+NEEDED = re.compile(rf"NRT_\w+|numba_attempt_nocopy_reshape|release_reference|llvm\..*|mem(cpy|set|move)|{_MATH}")
 FLAGS = ("-std=c11", "-O2", "-fvisibility=hidden", "-shared", "-s", "-ffp-contract=off")
 _RELEASE = "llvm.x86.atomic.sub.cc.i64"  # the one instruction of x86 in numba's code
 
@@ -108,7 +109,8 @@ class Machine:
 
 def library(machine: Callable[[], Machine], platform: Platform, name: str, key: str, folder: Path) -> bytes:
     """The shared library of a unit for a platform, kept in `folder` by the hash `key` of its package. Raises RunError."""
-    facts = repr((key, platform, FLAGS, numba.__version__, llvmlite.__version__)).encode() + b"".join((HERE / s).read_bytes() for s in SOURCES)
+    facts = repr((key, platform, FLAGS, numba.__version__, llvmlite.__version__)).encode()
+    facts += b"".join((HERE / source).read_bytes() for source in SOURCES)
     place = folder / f"{name}_{platform.folder}_{hashlib.sha256(facts).hexdigest()[:12]}.z"
     try:
         return zlib.decompress(place.read_bytes())
@@ -120,17 +122,18 @@ def library(machine: Callable[[], Machine], platform: Platform, name: str, key: 
             objects.append(Path(work, f"{level}.o"))
             objects[-1].write_bytes(machine().object_file(platform, level))
         made, packed = Path(work, f"unit.{platform.ending}"), Path(work, "packed")
-        _link(platform, objects, made, folder)
+        link(platform, objects, made, folder)
         packed.write_bytes(zlib.compress(made.read_bytes()))
         packed.replace(place)
         return made.read_bytes()
 
 
-def _link(platform: Platform, objects: list[Path], made: Path, folder: Path) -> None:
+def link(platform: Platform, objects: Sequence[Path], made: Path, folder: Path, *flags: str) -> None:
     """Compile the C face and link it. Raises RunError with the compiler's words where it fails."""
     several = ["-DLEVELS"] if len(objects) > 1 else []
     sources = [str(HERE / source) for source in SOURCES if source.endswith(".c") and source != "windows.c"]
     end = windows.arguments(made.parent) if platform.ending == "dll" else ["-fPIC", "-lm"]
-    command = [*zig.COMMAND, "cc", "-target", platform.target, *FLAGS, *several, "-o", str(made), *sources, *map(str, objects), *end]
+    files = ["-o", str(made), *sources, *map(str, objects)]
+    command = [*zig.COMMAND, "cc", "-target", platform.target, *FLAGS, *several, *flags, *files, *end]
     with locked(folder):
         zig.run(command, folder, f"the FMU's library for {platform.folder} cannot be made")
