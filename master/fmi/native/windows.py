@@ -7,6 +7,7 @@ comes with it (UCRT, Windows 10 and later), of which import libraries are made f
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Mapping
 from pathlib import Path
 
 from . import zig
@@ -24,16 +25,21 @@ IMPORTS = {
 }
 
 
-def arguments(work: Path) -> list[str]:
-    """What the linker is given for Windows; files are made in the folder `work`. Raises RunError."""
+def arguments(work: Path, entry: str = "DllMain", more: Mapping[str, str] | None = None) -> list[str]:
+    """What zig is given to link for Windows, beside the sources; files are made in the folder `work`.
+
+    entry: the function that is called first; more: names of functions by library that are needed beside IMPORTS. Raises RunError.
+    """
     found = importlib.util.find_spec("ziglang")
     headers = Path(str(found.origin)).parent / "lib/libc/include/any-windows-any" if found else work
     libraries = []
-    for name, functions in IMPORTS.items():
+    for name, known in IMPORTS.items():
+        functions = f"{known} {(more or {}).get(name, '')}"
         definition, library = work / f"{name}.def", work / f"{name}.lib"
         definition.write_text("\n".join([f"LIBRARY {name}.dll", "EXPORTS", *functions.split(), ""]))
         made = ["dlltool", "-m", "i386:x86-64", "-d", str(definition), "-l", str(library)]
         zig.run([*zig.COMMAND, *made], work, "the FMU's library for Windows cannot be made")
         libraries.append(str(library))
-    plain = ["-nostdlib", "-Wl,-e,DllMain", "-isystem", str(headers), "-D_UCRT", "-D__MSVCRT_VERSION__=0xE00", "-D__USE_MINGW_ANSI_STDIO=0"]
+    defined = ["-D_UCRT", "-D__MSVCRT_VERSION__=0xE00", "-D__USE_MINGW_ANSI_STDIO=0"]
+    plain = ["-nostdlib", f"-Wl,-e,{entry}", "-isystem", str(headers), *defined]
     return [*plain, str(HERE / "windows.c"), *libraries]
