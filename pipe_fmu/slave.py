@@ -12,13 +12,13 @@ from .parameters import PipeParameters
 from .pipe import Pipe
 from .step.state import ENERGIES, LEDGER, PipeState
 from .validity import QUIET
-from .vectors import Now, loaded, packed, state_size, store
+from .vectors import Now, loaded, state_size, store
 
 Port = tuple[int, str | tuple[str, ...], str]
 
 _MOTION = "of the hang-off point, mean over the coming step, in e"
 N_INPUTS = 42
-UNSTABLE = "statics: the equilibrium is not stable; the line will leave it at the least push"
+UNSTABLE = native.UNSTABLE
 _PULL = "of the pipe on the vessel at the hang-off point, in e"
 _MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) + 3 * ("rad/(N.m.s)",))
 _IMPEDANCE = 3 * (3 * ("N.s/m",) + 3 * ("N.s/rad",)) + 3 * (3 * ("N.s",) + 3 * ("N.m.s/rad",))
@@ -50,8 +50,8 @@ class PipeUnit:
 
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
-        self._unit = native.unit_of(self._pipe)
-        self._constants, self._places = packed(self._unit), native.output_places(len(self._pipe.s))
+        self._unit, self._constants = self._pipe.unit, self._pipe.constants
+        self._places = native.output_places(len(self._pipe.s))
         self._values_of: Any = None  # the state that the outputs are of
         self._values, self._known = np.empty(0), set[int]()
         self.remark = ""  # what the host's log should say of the start, or of the last step that was done; a line each

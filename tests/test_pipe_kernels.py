@@ -111,7 +111,7 @@ def test_above_the_surface_there_is_no_pressure():
 def test_a_node_has_the_walls_of_the_sections_below_and_above_it():
     sections = (replace(P16, length=500.0), replace(P16, length=700.0, wall_thickness=0.0254))
     parameters = PipeParameters(sections=sections)
-    below, above = wall_stress.walls(parameters, np.array([0.0, 250.0, 500.0, 501.0, 1200.0]))
+    below, above = constants.walls(parameters, np.array([0.0, 250.0, 500.0, 501.0, 1200.0]))
     thin, thick = (section.steel_area for section in sections)
     np.testing.assert_allclose(below.area, [thin, thin, thin, thick, thick], rtol=1e-12)
     np.testing.assert_allclose(above.area, [thin, thin, thick, thick, thick], rtol=1e-12)

@@ -56,14 +56,6 @@ class Bed(NamedTuple):
     friction_speed: float  # [m/s]
 
 
-
-def bed_of(seabed: Seabed | None, bearing: Array, diameter: Array) -> Bed:
-    """The bed under elements that lie with `bearing` (n - 1,) and `diameter` (n - 1,), or none."""
-    if seabed is None:
-        return Bed(np.zeros(0), np.zeros(0), 0.0, 0.0, 1.0)
-    return Bed(bearing, diameter, float(seabed.damping), float(seabed.friction), float(seabed.friction_speed))
-
-
 @kernel
 def bed_columns(bed, n):
     """The bed with its arrays as columns (simd/columns.py)."""
