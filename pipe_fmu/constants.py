@@ -1,10 +1,11 @@
-"""The constants of a pipe unit (vectors.py) from its parameters' numbers (values.py): the same kernel fills them for Python and in an FMU."""
+"""The constants of a pipe unit (vectors.py) from its parameters' numbers (values.py), by one kernel for Python and FMUs in machine code."""
 
 import math
 
 import numpy as np
 
 from . import section as sections
+from . import vectors
 from .arrays import Array
 from .compiled import kernel
 from .line import shear_stiffness
@@ -15,7 +16,6 @@ from .rules import WORDS, refusal
 from .section import bearing, shape_of, weight_in_water
 from .validity import NO_STRAIN, SURFACE, bearable
 from .values import N_GLOBAL, N_SECTION, place, values
-from . import vectors
 from .vectors import constants_size, unpacked
 
 _ANEW = "such an FMU must be exported anew"
@@ -40,14 +40,13 @@ _FLOW, _TIMES = place("environment.current.velocity"), place("environment.curren
 
 def constants_on(parameters: PipeParameters, s: Array) -> Array:
     """Constants of a unit with its nodes at `s` (n,) [m]."""
-    n, environment, current = len(s), parameters.environment, parameters.environment.current
-    depths, factors = ((), ()) if current is None else current.shape(environment.depth)
+    n, current = len(s), parameters.environment.current
+    depths, factors = ((), ()) if current is None else current.shape(math.nan)
     there = parameters.seabed is not None, parameters.added_mass is not None, parameters.internal_damping > 0.0
     c = np.zeros(constants_size(n, len(depths), *there))
     c[vectors.NODES], c[vectors.LEVELS] = n, len(depths)
     c[vectors.BED], c[vectors.ADDED_MASS], c[vectors.DAMPING] = there
     c[vectors.FOOT_CLAMPED], c[vectors.TOP_CLAMPED] = parameters.foot == "clamped", parameters.top == "clamped"
-    c[vectors.TOP_RANGE], c[vectors.TABULATED] = parameters.top_range, current is not None and current.profile == "table"
     unit = unpacked(c)
     unit.s[:] = s
     unit.fixed.section[:] = sections_at(parameters, 0.5 * (s[1:] + s[:-1]))
@@ -69,7 +68,7 @@ def walls(parameters: PipeParameters, s: Array) -> tuple[Wall, Wall]:
     pressures = float(sea.water_density * sea.gravity), float(sea.depth)
     out = []
     for side in (-_AT_JOINT, _AT_JOINT):
-        wall = Wall(*np.empty((6, len(s))), *pressures, np.empty(len(s)))
+        wall = Wall._make([*np.empty((6, len(s))), *pressures, np.empty(len(s))])
         fill_walls(values(parameters), sections_at(parameters, s + side), wall)
         out.append(wall)
     return out[0], out[1]
@@ -195,8 +194,8 @@ def _fill_numbers(given, c):
 def _fill_sea(given, unit):
     """Fill in the current's levels, from the surface down, and its velocities there."""
     for k in range(unit.sea.levels.shape[0]):
-        below = unit.fixed.depths[k] if unit.fixed.tabulated or k == 0 else given[_DEPTH]
-        unit.sea.levels[k] = below - given[_DEPTH]
+        below = unit.fixed.depths[k]
+        unit.sea.levels[k] = 0.0 if math.isnan(below) else below - given[_DEPTH]
         for i in range(3):
             unit.sea.velocities[k, i] = unit.fixed.factors[k] * given[_FLOW + i]
 

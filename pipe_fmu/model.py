@@ -7,8 +7,8 @@ import numpy as np
 
 from . import mesh
 from .arrays import Array
-from .element.strains import ROWS
 from .constants import constants_on
+from .element.strains import ROWS
 from .line import water_at
 from .parameters import PipeParameters
 from .results import section_forces

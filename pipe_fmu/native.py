@@ -10,13 +10,13 @@ import numpy as np
 from . import validity
 from .compiled import kernel
 from .constants import REFUSALS, fill_constants, refused
+from .follow import alike, flows, follow, freeze, newton
 from .line import water_at
 from .maths.so3 import apply
 from .notes import DISCARD, ERROR, WARNING, note
 from .results.end_forces import matrix_at
 from .results.section_forces import SectionForces, centreline_length, largest_bending_square, nodal_wrenches
 from .results.wall_stress import fill_wall_tension, largest_stress
-from .statics.follow import alike, at_rest, flows, follow, stands
 from .step.integrator import FLAWS, energy_of, rest
 from .step.state import ENERGIES, WORK_PORTS, timed
 from .substeps import divide
@@ -217,22 +217,23 @@ def unit_start(constants, exported, exported_state, inputs, time, state, notes):
     It is the exported state where nothing is changed that bears on the equilibrium; else the equilibrium is followed from there.
     """
     notes[0] = 0.0
-    unit, was = unpacked(constants), unpacked(exported)
+    unit = unpacked(constants)
     now = loaded(exported_state, unit.s.shape[0], unit.line.added_mass.shape[0] > 0)
-    start = at_rest(was.line, was.top), water_at(was.sea, exported_state[0])
-    end = at_rest(unit.line, unit.top), water_at(unit.sea, time)
+    start, end = exported.copy(), constants.copy()
+    freeze(start, exported_state[0])
+    freeze(end, time)
     position, quaternion = now.pipe.position.copy(), now.pipe.quaternion.copy()
     top, stiffness, residual, told = now.top, now.impedance, now.residual, np.zeros(KINDS)
-    stable = stands(*start, position, quaternion)
-    if not alike(start, end, was.top, unit.top):
-        found, arrived = follow(start, end, unit.s, unit.top, top[3:], position, quaternion, stable)
+    stable = newton(start, np.zeros(3), position, quaternion, 1.0).stable
+    if not alike(start, end):
+        found, arrived = follow(start, end, top[3:], position, quaternion, stable)
         if not arrived:
             _begin(notes, ERROR, _ASTRAY, _NOTHING, 0)
             return ERROR
         top, stiffness, residual, stable = found.top, found.stiffness, found.residual, found.stable
     pipe = rest(unit.line, position, quaternion, time)
-    if not stable and not flows(end[1]):  # in a current this is not known
+    if not stable and not flows(end):  # in a current this is not known
         _begin(notes, WARNING, _UNSTABLE, _NOTHING, 0)
     look(unit, pipe, told, notes)
-    store(pipe, top, stiffness, 0, residual, told, state)
+    store(pipe, top, stiffness, int(now.iterations), residual, told, state)
     return 0

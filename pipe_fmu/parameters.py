@@ -111,4 +111,3 @@ class PipeParameters:
     def all_sections(self) -> tuple[Section, ...]:
         """The sections from foot to top, each with its length."""
         return self.sections or (self.section,)
-

@@ -164,7 +164,8 @@ def weight_in_water(mass, area, water_density, gravity):
 def bearing(weight, heaviest, lightest, reference):
     """Weight per length [N/m] of a section from which the bed's stiffness under it follows.
 
-    It is the `reference` (unless NaN), or the section's own; for a section that floats, that of the heaviest (of the lightest, if all float).
+    It is the `reference` (unless NaN), or the section's own; for a section that floats, that of the heaviest (of the lightest, if all
+    float).
     """
     if not math.isnan(reference):
         return reference

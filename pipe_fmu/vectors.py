@@ -20,9 +20,9 @@ NODES, LEVELS, ADDED_MASS, BED, DAMPING, YIELDS, PARTS = range(7)  # counts, and
 HEAD = 7
 (
     FOOT_CLAMPED, TOP_CLAMPED, NUMERICAL_DAMPING, BED_DAMPING, FRICTION, FRICTION_SPEED, CURRENT_START, RAMP, PERIOD, DRAG, WATER, DEPTH,
-    DEEPEST, SURFACE, HIGHEST, NO_PULL, TOP_RANGE, TABULATED,
-) = range(HEAD, HEAD + 18)  # fmt: skip
-_ARRAYS = HEAD + 18
+    DEEPEST, SURFACE, HIGHEST, NO_PULL,
+) = range(HEAD, HEAD + 16)  # fmt: skip
+_ARRAYS = HEAD + 16
 N_WORKS, KINDS = len(WORKS), len(QUIET)
 
 
@@ -31,10 +31,8 @@ class Fixed(NamedTuple):
 
     section: Array  # (n - 1,) number of the section that an element's middle lies in
     node_section: Array  # (n,) and of that below a node
-    depths: Array  # (k,) of the levels of the current below the surface [m], where these are a table
+    depths: Array  # (k,) of the current's levels below the surface [m], NaN at the bed
     factors: Array  # (k,) of the current there
-    top_range: float
-    tabulated: bool
 
 
 class Unit(NamedTuple):
@@ -131,12 +129,10 @@ def unpacked(c):
     factors, at = _row(c, at, k)
     loads = Loads(weight, drag, Bed(bearing, diameter, c[BED_DAMPING], c[FRICTION], c[FRICTION_SPEED]))
     ends = c[FOOT_CLAMPED] != 0.0, c[TOP_CLAMPED] != 0.0
-    line = Line(
-        length, stiffness, share, loads, mass, offset, inertia, spin_damping, added_mass, damping, *ends, c[NUMERICAL_DAMPING]
-    )
+    line = Line(length, stiffness, share, loads, mass, offset, inertia, spin_damping, added_mass, damping, *ends, c[NUMERICAL_DAMPING])
     sea = Sea(levels, velocities, c[CURRENT_START], c[RAMP], c[PERIOD], c[DRAG] != 0.0)
     limits = Limits(c[DEEPEST], c[SURFACE], c[HIGHEST], c[NO_PULL], radius, bearable)
-    fixed = Fixed(section, node_section, depths, factors, c[TOP_RANGE], c[TABULATED] != 0.0)
+    fixed = Fixed(section, node_section, depths, factors)
     return Unit(
         s, line, MassPerLength(along, across), sea, walls, element_walls, limits, reference, int(c[PARTS]), c[YIELDS] != 0.0, top, fixed
     )
@@ -200,7 +196,5 @@ def loaded(vector, n, added_mass):
     added, at = _table(vector, at, n if added_mass else 0, 3)
     strain, at = _table(vector, at, n - 1, 7)
     chord, at = _table(vector, at, n - 1, 4)
-    pipe = PipeState(
-        vector[0], position, quaternion, velocity, rate, added, strain, chord, last, before, earlier, vector[1], works
-    )
+    pipe = PipeState(vector[0], position, quaternion, velocity, rate, added, strain, chord, last, before, earlier, vector[1], works)
     return Now(pipe, top, impedance, vector[2], vector[3], told)

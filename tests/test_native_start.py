@@ -1,4 +1,4 @@
-"""A unit's constants and start from its values, in kernels: against those of dataclasses, and against statics from nothing on the same nodes."""
+"""A unit's constants and start from its values, in kernels: against dataclasses, and against statics from nothing on the same nodes."""
 
 import math
 import time
@@ -175,7 +175,7 @@ def test_a_start_with_changed_values_is_that_of_statics_from_nothing(name, start
     wanted = started(new, at)
     begun(started(old, exported_at), new, at)  # compiles
     status, words, state, seconds = begun(started(old, exported_at), new, at)
-    print(f"{name}: {1e3 * seconds:.1f} ms")  # noqa: T201
+    print(f"{name}: {1e3 * seconds:.1f} ms")
     assert status == 0
     assert words == [line for line in wanted.remark.splitlines() if "usually" not in line]
     found, right, pipe = loaded(state, nodes.nodes, new.added_mass is not None), wanted.now, wanted._pipe
@@ -210,7 +210,7 @@ REFUSED = [
     ({"section.wall_thickness": 0.25}, "section.wall_thickness = 0.25: must be <= the outer radius 0.2032 m"),
     ({"max_substeps": 4}, "max_substeps = 4: must be one of 1, 3, 9, 27, 81, 243, 729"),
     ({"top_position[1]": 1200.0}, "length = 1200: must be at least 1373.54 m, or the line is stretched by more than 5% .*, 1442.22 m"),
-    ({"top_position[1]": 975.0}, "top_range = 10: must be at most 8.73.* m, where the line is stretched by 5%"),
+    ({"top_position[1]": 970.0}, "top_range = 10: must be at most [0-9.]* m, where the line is stretched by 5%"),
     ({"top_quaternion[1]": 0.5}, r"top_quaternion = \(0.5, 0, 0, 0\): must have length 1, or be all zero"),
 ]
 
@@ -232,7 +232,7 @@ def test_a_bed_is_refused_under_a_line_without_weight():
     old = Pipe(replace(TUBE, section=replace(sections, mass=300.0))).parameters
     given = values(old)
     given[value_places(old)["section.mass"]] = sections.mass
-    with pytest.raises(ValueError) as refusal:
+    with pytest.raises(ValueError, match=r"seabed\.reference_weight = nothing: must be given") as refusal:
         replace(old, section=sections)
     status, _, said = refilled(constants_on(old, np.array(old.nodes_at)), given)
     assert (status, said) == (ERROR, [str(refusal.value)])

@@ -8,12 +8,12 @@ from pipe_helpers import P16, assembled, bar, loaded, rotation, started, straigh
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
-from pipe_fmu import PipeParameters
+from pipe_fmu import PipeParameters, constants
 from pipe_fmu.element import ends
 from pipe_fmu.environment import Environment
 from pipe_fmu.line import Water
 from pipe_fmu.maths import block_tridiagonal
-from pipe_fmu.results import section_forces, wall_stress
+from pipe_fmu.results import section_forces
 from pipe_fmu.statics import stability
 from pipe_fmu.step import newton
 from pipe_fmu.step import system as step_kernel

@@ -40,8 +40,8 @@ def present(parameters: Any) -> dict[str, bool]:
 
 @inner
 def fill_loads(loads, e, weight, bearing, diameter, water_density, tangential, normal):
-    """Fill in the loads on element e: its submerged weight per length [N/m] and that which lies at z = 0, the diameter over its coating [m],
-    and its coefficients of drag.
+    """Fill in the loads on element e: its submerged weight per length [N/m] and that which lies at z = 0, the diameter over its coating
+    [m], and its coefficients of drag.
     """
     loads.weight[e] = weight
     loads.drag[e, 0], loads.drag[e, 1] = 0.5 * water_density * diameter * tangential, 0.5 * water_density * diameter * normal

@@ -13,8 +13,6 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from ..arrays import Array, distinct
 from ..checks import check_fields, number
 from ..compiled import inner, kernel

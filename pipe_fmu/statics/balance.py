@@ -233,4 +233,3 @@ def _largest_eigenvalues(operator: Callable[[Array], Array], start: Array) -> ND
         projected[k + 1, k], basis[k + 1] = left, new / left
     found = np.linalg.eigvals(projected[:count, :count]).astype(complex)
     return found[np.argsort(-np.abs(found))[:_NEAREST]]
-

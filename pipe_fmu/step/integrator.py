@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
-from ..compiled import kernel, inlined
+from ..compiled import inlined, kernel
 from ..element.strains import INSIDE_OUT, ROWS, chords, inverted
 from ..line import Line, Water
 from .energy import energies
