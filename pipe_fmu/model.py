@@ -43,6 +43,12 @@ def resolve(parameters: PipeParameters) -> PipeParameters:
     raise ValueError(f"tolerance = {parameters.tolerance:g}: must be within reach of {_TRIES[-1]} elements")
 
 
+def constants(parameters: PipeParameters) -> Array:
+    """Constants of a unit, its nodes placed. Raises ValueError as `resolve` does."""
+    placed = resolve(parameters)
+    return constants_on(placed, np.array(placed.nodes_at))
+
+
 def unit_on(parameters: PipeParameters, s: Array) -> Unit:
     """The unit with its nodes at `s` (n,) [m]."""
     unit: Unit = unpacked(constants_on(parameters, s))

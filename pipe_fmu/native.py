@@ -13,6 +13,7 @@ from .constants import REFUSALS, fill_constants, refused
 from .follow import alike, flows, follow, freeze, newton
 from .line import water_at
 from .maths.so3 import apply
+from .model import constants as constants
 from .notes import DISCARD, ERROR, WARNING, note
 from .results.end_forces import matrix_at
 from .results.section_forces import SectionForces, centreline_length, largest_bending_square, nodal_wrenches
@@ -20,6 +21,8 @@ from .results.wall_stress import fill_wall_tension, largest_stress
 from .step.integrator import FLAWS, energy_of, rest
 from .step.state import ENERGIES, WORK_PORTS, timed
 from .substeps import divide
+from .values import value_places as value_places
+from .values import values as values
 from .vectors import KINDS, loaded, store, unpacked
 
 MESSAGES = (

@@ -4,7 +4,7 @@ import numpy as np
 
 from . import model, validity
 from .arrays import Array
-from .constants import constants_on, walls
+from .constants import walls
 from .line import Water, water_at
 from .maths.so3 import matrix
 from .notes import SIZE, texts
@@ -25,7 +25,7 @@ class Pipe:
 
     def __init__(self, parameters: PipeParameters) -> None:
         self.parameters = model.resolve(parameters)
-        self.constants = constants_on(self.parameters, np.array(self.parameters.nodes_at))
+        self.constants = model.constants(self.parameters)
         self.unit: Unit = unpacked(self.constants)
         self.s, self.line, self.sea, self.mass = self.unit.s, self.unit.line, self.unit.sea, self.unit.mass
         self.element_walls = self.unit.element_walls

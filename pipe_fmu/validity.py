@@ -58,8 +58,8 @@ def bearable(thickness, modulus, yield_stress):
 def look(s, stiffness, bounds, position, strain, utilisation, told, first, notes):
     """Note each kind that is beyond its limit and half as bad again as `told` (5,), and remember it there.
 
-    s (n,): arc lengths of the nodes; stiffness (n - 1, 6); `utilisation` is that of the yield stress, 0 where there is none; `first`: number
-    of the template of the first kind.
+    s (n,): arc lengths of the nodes; stiffness (n - 1, 6); `utilisation` is that of the yield stress, 0 where there is none; `first`:
+    number of the template of the first kind.
     """
     beyond, value, place = np.empty(5), np.empty(5), np.zeros(5)
     beyond[4] = value[4] = utilisation

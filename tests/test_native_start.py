@@ -205,6 +205,20 @@ def test_what_does_not_bear_on_the_equilibrium_leaves_the_exported_one(started):
     np.testing.assert_array_equal(state[1:], unit.state[1:])
 
 
+def test_where_the_way_cannot_be_gone_the_start_is_refused(started):
+    """From a state that is none, no equilibrium is found; the state asked for stays as it was."""
+    unit = started(CLAMPED, 0.0)
+    exported, nowhere = unit._constants, unit.state.copy()
+    loaded(nowhere, CLAMPED.nodes, True).pipe.position[5] = math.nan
+    _, constants, _ = refilled(exported, values(wall(unit._pipe.parameters, 0.025)))
+    state, notes = np.zeros_like(nowhere), np.zeros(SIZE)
+    assert native.unit_start(constants, exported, nowhere, np.zeros(N_INPUTS), 0.0, state, notes) == ERROR
+    assert texts(notes, native.MESSAGES) == [
+        "statics: no equilibrium was found on the way from the exported one; export the FMU anew with these values"
+    ]
+    assert not state.any()
+
+
 TUBE = PipeParameters(nodes=8, mesh="uniform", seabed=Seabed(), top_range=10.0)
 REFUSED = [
     ({"section.wall_thickness": 0.25}, "section.wall_thickness = 0.25: must be <= the outer radius 0.2032 m"),
