@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from .arrays import Array
-from .compiled import kernel
+from .compiled import inner, kernel
 from .environment import time_factor
 from .loads import Loads, loads_columns
 from .simd.columns import column, columns
@@ -57,9 +57,10 @@ def water_at(sea, time):
     return Water(sea.levels[:count], factor * sea.velocities[:count], sea.drag)
 
 
-def shear_stiffness(shear: Array, bending: Array, length: Array) -> tuple[Array, Array]:
-    """Chord shear stiffness K [N] and bending share p of elements: 1/K = 1/GA + h^2/(12 EI) (see element/strains.py)."""
-    flexibility = length**2 / (12.0 * bending)
+@inner
+def shear_stiffness(shear, bending, length):
+    """Chord shear stiffness K [N] and bending share p of an element: 1/K = 1/GA + h^2/(12 EI) (see element/strains.py)."""
+    flexibility = length * length / (12.0 * bending)
     stiffness = 1.0 / (1.0 / shear + flexibility)
     return stiffness, flexibility * stiffness
 

@@ -8,20 +8,23 @@ import math
 import numpy as np
 
 from . import validity
-from .arrays import Array
 from .compiled import kernel
+from .constants import REFUSALS, fill_constants, refused
+from .follow import alike, flows, follow, freeze, newton
 from .line import water_at
 from .maths.so3 import apply
-from .notes import DISCARD, WARNING, note
+from .model import constants as constants
+from .notes import DISCARD, ERROR, WARNING, note
 from .parameters import PipeParameters
-from .pipe import Pipe
 from .results.end_forces import matrix_at
 from .results.section_forces import SectionForces, centreline_length, largest_bending_square, nodal_wrenches
 from .results.wall_stress import fill_wall_tension, largest_stress
-from .step.integrator import FLAWS, energy_of
+from .step.integrator import FLAWS, energy_of, rest
 from .step.state import ENERGIES, WORK_PORTS, timed
 from .substeps import divide
-from .vectors import Unit, loaded, store, unpacked
+from .values import value_places as value_places
+from .values import values as values
+from .vectors import KINDS, loaded, store, unpacked
 
 MESSAGES = (
     *validity.WORDS,
@@ -33,20 +36,17 @@ MESSAGES = (
     f"step of %g s at t = %g s, nor in sub-steps of %g s: an element would be {FLAWS[2]}; more nodes may help",
     "step of %g s at t = %g s: done in %d sub-steps of %g s or more, %d corrections; pose and work of the top are exact, but its velocity "
     "jumps at both ends of the step instead of being smooth",
+    *REFUSALS,
+    "statics: the equilibrium is not stable; the line will leave it at the least push",
+    "statics: no equilibrium was found on the way from the exported one; export the FMU anew with these values",
 )
+_REFUSED, _UNSTABLE, _ASTRAY = len(validity.WORDS) + 7, len(MESSAGES) - 2, len(MESSAGES) - 1
+UNSTABLE = MESSAGES[_UNSTABLE]
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
 _LOST, _FLAWED, _DIVIDED = len(validity.WORDS), len(validity.WORDS) + 2, len(validity.WORDS) + 6
 DIRECT, STORED, RECOVERED = range(3)  # groups of outputs: what the state holds, its energies, and what is recovered from equilibrium
-N_GROUPS = 3
+N_GROUPS, N_INPUTS = 3, 42
 ALWAYS = np.inf  # a step of any length is tried whole
-
-
-def unit_of(pipe: Pipe) -> Unit:
-    """All constants of a pipe unit."""
-    parameters, s = pipe.parameters, pipe.s
-    reference = np.array([*parameters.reference_force, *parameters.reference_moment])
-    yields = any(section.yield_stress is not None for section in parameters.all_sections)
-    walls = pipe.walls[0], pipe.element_walls
-    return Unit(s, pipe.line, pipe.mass, pipe.sea, *walls, validity.limits(pipe), reference, parameters.max_substeps, yields)
 
 
 def _sizes(n: int) -> tuple[dict[str, int], ...]:
@@ -194,27 +194,50 @@ def unit_step(constants, inputs, time, h, state, after, notes):
 
 
 @kernel
+def _begin(notes, status, template, values, count):
+    """Make the first note, with so many of four values."""
+    note(notes, status, template, values)
+    notes[3] = float(count)
+
+
+@kernel
 def unit_constants(exported, values, constants, notes):
     """Fill `constants` with those of the parameters' `values`; 0, or ERROR and a note where these break a rule."""
     notes[0] = 0.0
     for i in range(constants.shape[0]):
         constants[i] = exported[i]
+    number, numbers, count = refused(values, exported)
+    if number >= 0:
+        _begin(notes, ERROR, _REFUSED + number, numbers, count)
+        return ERROR
+    fill_constants(values, constants)
     return 0
 
 
 @kernel
 def unit_start(constants, exported, exported_state, inputs, time, state, notes):
-    """Fill `state` with that at the start; 0, or ERROR and a note where there is none."""
+    """Fill `state` with that of rest at `time` [s]: 0 and remarks, or ERROR and a note where no equilibrium is found.
+
+    It is the exported state where nothing is changed that bears on the equilibrium; else the equilibrium is followed from there.
+    """
     notes[0] = 0.0
-    for i in range(state.shape[0]):
-        state[i] = exported_state[i]
-    state[0] = time
+    unit = unpacked(constants)
+    now = loaded(exported_state, unit.s.shape[0], unit.line.added_mass.shape[0] > 0)
+    start, end = exported.copy(), constants.copy()
+    freeze(start, exported_state[0])
+    freeze(end, time)
+    position, quaternion = now.pipe.position.copy(), now.pipe.quaternion.copy()
+    top, stiffness, residual, told = now.top, now.impedance, now.residual, np.zeros(KINDS)
+    stable = newton(start, np.zeros(3), position, quaternion, 1.0).stable
+    if not alike(start, end):
+        found, arrived = follow(start, end, top[3:], position, quaternion, stable)
+        if not arrived:
+            _begin(notes, ERROR, _ASTRAY, _NOTHING, 0)
+            return ERROR
+        top, stiffness, residual, stable = found.top, found.stiffness, found.residual, found.stable
+    pipe = rest(unit.line, position, quaternion, time)
+    if not stable and not flows(end):  # in a current this is not known
+        _begin(notes, WARNING, _UNSTABLE, _NOTHING, 0)
+    look(unit, pipe, told, notes)
+    store(pipe, top, stiffness, int(now.iterations), residual, told, state)
     return 0
-
-
-def values(parameters: PipeParameters) -> Array:
-    return np.zeros(0)
-
-
-def value_places(parameters: PipeParameters) -> dict[str, int]:
-    return {}

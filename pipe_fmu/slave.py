@@ -12,13 +12,12 @@ from .parameters import PipeParameters
 from .pipe import Pipe
 from .step.state import ENERGIES, LEDGER, PipeState
 from .validity import QUIET
-from .vectors import Now, loaded, packed, state_size, store
+from .vectors import Now, loaded, state_size, store
 
 Port = tuple[int, str | tuple[str, ...], str]
 
 _MOTION = "of the hang-off point, mean over the coming step, in e"
-N_INPUTS = 42
-UNSTABLE = "statics: the equilibrium is not stable; the line will leave it at the least push"
+UNSTABLE = native.UNSTABLE
 _PULL = "of the pipe on the vessel at the hang-off point, in e"
 _MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) + 3 * ("rad/(N.m.s)",))
 _IMPEDANCE = 3 * (3 * ("N.s/m",) + 3 * ("N.s/rad",)) + 3 * (3 * ("N.s",) + 3 * ("N.m.s/rad",))
@@ -50,8 +49,8 @@ class PipeUnit:
 
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
-        self._unit = native.unit_of(self._pipe)
-        self.constants, self._places = packed(self._unit), native.output_places(self._pipe.parameters)
+        self._unit, self.constants = self._pipe.unit, self._pipe.constants
+        self._places = native.output_places(self._pipe.parameters)
         self._values_of: Any = None  # the state that the outputs are of
         self._values, self._known = np.empty(0), set[int]()
         self.remark = ""  # what the host's log should say of the start, or of the last step that was done; a line each
@@ -66,8 +65,8 @@ class PipeUnit:
         """Run every kernel once."""
         notes, numbers = np.zeros(SIZE), native.values(self.parameters)
         native.unit_constants(self.constants, numbers, np.empty_like(self.constants), notes)
-        native.unit_start(self.constants, self.constants, self.state, np.zeros(N_INPUTS), 0.0, np.empty_like(self.state), notes)
-        self._stepped(0.0, 1e-3, np.zeros(N_INPUTS), notes)
+        native.unit_start(self.constants, self.constants, self.state, np.zeros(native.N_INPUTS), 0.0, np.empty_like(self.state), notes)
+        self._stepped(0.0, 1e-3, np.zeros(native.N_INPUTS), notes)
         native.unit_outputs(self.constants, self.state, 0, np.empty(max(part.stop for part, _ in self._places.values())))
 
     def _stored(self, state: PipeState, top: Array, impedance: Array, residual: float, told: Array) -> Array:
@@ -138,7 +137,7 @@ class PipeUnit:
         notes, told = np.zeros(SIZE), QUIET.copy()
         native.look(self._unit, state, told, notes)
         self.state = self._stored(state, found.top, found.stiffness, found.residual, told)
-        self._stepped(time, 1e-3, np.zeros(N_INPUTS), np.zeros(SIZE))  # so that compiling it belongs to the start, not to the first step
+        self._stepped(time, 1e-3, np.zeros(native.N_INPUTS), np.zeros(SIZE))  # compiling it belongs to the start
         remarks = [] if found.stable else [UNSTABLE]
         self.remark = "\n".join([*remarks, *validity.of_parameters(self._pipe.parameters), *texts(notes, native.MESSAGES)])
         return None

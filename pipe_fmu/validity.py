@@ -7,17 +7,17 @@
   the highest grade, X120, yields at 0.4 %), or any other section by more than the 5 % of the law of small strains.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from .arrays import Array
 from .checks import unusual
-from .compiled import kernel
-from .notes import SIZE, WARNING, note, texts
-from .parameters import MOST_STRETCH, PipeParameters, Section
-from .pipe import Pipe
-from .step.state import PipeState
+from .compiled import inner, kernel
+from .notes import WARNING, note
+from .parameters import PipeParameters
+from .rules import MOST_STRETCH
 
 QUIET = np.zeros(5)  # nothing said yet: below, above, compression, strain, yield
 STEEL_STRAIN, STEEL_MODULUS = 0.005, 150e9  # strain a steel wall may have without `yield_stress`; Pa, below which a wall is not of steel
@@ -46,33 +46,12 @@ class Limits(NamedTuple):
     bearable: Array  # (n - 1,) strain, infinite where a section has a yield stress
 
 
-def limits(pipe: Pipe) -> Limits:
-    """Limits of a line."""
-    parameters = pipe.parameters
-    sections = parameters.all_sections
-    ends = np.cumsum([section.length or parameters.length for section in sections])
-    which = np.minimum(np.searchsorted(ends, 0.5 * (pipe.s[1:] + pipe.s[:-1])), len(sections) - 1)
-    return Limits(
-        np.inf if parameters.seabed is not None else 0.5 * max(section.hydrodynamic_diameter for section in sections),
-        -parameters.environment.depth,
-        SURFACE * parameters.environment.depth,
-        NO_STRAIN * float(pipe.line.stiffness[:, 0].max()),
-        np.array([0.0 if section.wall_thickness is None else section.radii[1] for section in sections])[which],
-        np.array([_bearable(section) for section in sections])[which],
-    )
-
-
-def _bearable(section: Section) -> float:
-    if section.yield_stress is not None:
-        return np.inf
-    return MOST_STRETCH if section.wall_thickness is None or section.youngs_modulus < STEEL_MODULUS else STEEL_STRAIN
-
-
-def remarks(pipe: Pipe, state: PipeState, utilisation: float) -> list[str]:
-    """One line on each kind that is beyond its limit in a state."""
-    notes = np.zeros(SIZE)
-    look(pipe.s, pipe.line.stiffness, limits(pipe), state.position, state.strain, utilisation, QUIET.copy(), 0, notes)
-    return texts(notes, WORDS)
+@inner
+def bearable(thickness, modulus, yield_stress):
+    """Strain that a section bears: infinite where its yield stress says more; numbers that are not given are NaN."""
+    if not math.isnan(yield_stress):
+        return math.inf
+    return STEEL_STRAIN if modulus >= STEEL_MODULUS and not math.isnan(thickness) else MOST_STRETCH
 
 
 @kernel

@@ -1,12 +1,10 @@
 """The pipe's constants and its state as plain vectors, and back: the order of what lies in them, once.
 
-Constants: HEAD counts, the numbers of a unit, then the arrays of its mesh, line, sea, walls and limits. State: numbers, then the arrays of
-a PipeState. Kernels take slices, and copy nothing.
+Constants: HEAD counts, the time-independent numbers of a unit, then the arrays of the mesh, line, sea, walls and limits, and what of the
+parameters stays as it is (constants.py fills them). State: numbers, then the arrays of a PipeState. Kernels take slices, and copy nothing.
 """
 
 from typing import NamedTuple
-
-import numpy as np
 
 from .arrays import Array
 from .compiled import kernel
@@ -20,7 +18,21 @@ from .validity import QUIET, Limits
 
 NODES, LEVELS, ADDED_MASS, BED, DAMPING, YIELDS, PARTS = range(7)  # counts, and what there is, at the head of the constants
 HEAD = 7
+(
+    FOOT_CLAMPED, TOP_CLAMPED, NUMERICAL_DAMPING, BED_DAMPING, FRICTION, FRICTION_SPEED, CURRENT_START, RAMP, PERIOD, DRAG, WATER, DEPTH,
+    DEEPEST, SURFACE, HIGHEST, NO_PULL,
+) = range(HEAD, HEAD + 16)  # fmt: skip
+_ARRAYS = HEAD + 16
 N_WORKS, KINDS = len(WORKS), len(QUIET)
+
+
+class Fixed(NamedTuple):
+    """What no change of parameters changes."""
+
+    section: Array  # (n - 1,) number of the section that an element's middle lies in
+    node_section: Array  # (n,) and of that below a node
+    depths: Array  # (k,) of the current's levels below the surface [m], NaN at the bed
+    factors: Array  # (k,) of the current there
 
 
 class Unit(NamedTuple):
@@ -36,6 +48,8 @@ class Unit(NamedTuple):
     reference: Array  # (6,) force and moment from which force_change and moment_change count
     parts: int  # of a step that does not converge, at most
     yields: bool  # whether a section has a yield stress
+    top: Array  # (7,) position and attitude of the top at the start; the attitude all zero: as it hangs
+    fixed: Fixed
 
 
 class Now(NamedTuple):
@@ -49,27 +63,10 @@ class Now(NamedTuple):
     told: Array  # (KINDS,) what was remarked, see validity.look
 
 
-def packed(unit: Unit) -> Array:
-    """Constants as one vector."""
-    line, wall = unit.line, unit.element_walls
-    n, k = len(unit.s), len(unit.sea.levels)
-    head = [n, k, len(line.added_mass) > 0, len(line.loads.bed.bearing) > 0, len(line.damping) > 0, unit.yields, unit.parts]
-    bed, limits = line.loads.bed, unit.limits
-    numbers = [
-        line.foot_clamped, line.top_clamped, line.numerical_damping, bed.damping, bed.friction, bed.friction_speed,
-        unit.sea.start, unit.sea.ramp, unit.sea.period, unit.sea.drag, wall.water, wall.depth,
-        limits.deepest, limits.surface, limits.highest, limits.no_pull,
-    ]  # fmt: skip
-    arrays = [
-        unit.reference, unit.s, line.length, line.stiffness, line.share, line.loads.weight, line.loads.drag, bed.bearing, bed.diameter,
-        line.mass, line.offset, line.inertia, line.spin_damping, line.added_mass, line.damping, *unit.mass, unit.sea.levels,
-        unit.sea.velocities, *_wall(unit.walls), *_wall(wall), limits.radius, limits.bearable,
-    ]  # fmt: skip
-    return np.concatenate([np.array([*head, *numbers], dtype=float), *(np.ravel(array) for array in arrays)])
-
-
-def _wall(wall: Wall) -> list[Array]:
-    return [wall.area, wall.second_moment, wall.inner, wall.outer, wall.displaced, wall.contents, wall.yield_stress]
+def constants_size(n: int, k: int, bed: bool, added_mass: bool, damping: bool) -> int:
+    """Numbers in the constants of a unit of n nodes, k levels of the current, and what else there is."""
+    optional = (2 * (n - 1) if bed else 0) + (3 * n if added_mass else 0) + (n - 1 if damping else 0)
+    return _ARRAYS + 13 + 17 * n + 24 * (n - 1) + 6 * k + optional
 
 
 @kernel
@@ -101,9 +98,9 @@ def unpacked(c):
     """The Unit of a vector of constants."""
     n, k = int(c[NODES]), int(c[LEVELS])
     e, lying = n - 1, n - 1 if c[BED] != 0.0 else 0
-    numbers = c[HEAD : HEAD + 16]
-    at = HEAD + 16
+    at = _ARRAYS
     reference, at = _row(c, at, 6)
+    top, at = _row(c, at, 7)
     s, at = _row(c, at, n)
     length, at = _row(c, at, e)
     stiffness, at = _table(c, at, e, 6)
@@ -122,17 +119,22 @@ def unpacked(c):
     across, at = _row(c, at, e)
     levels, at = _row(c, at, k)
     velocities, at = _table(c, at, k, 3)
-    walls, at = _walls_from(c, at, n, numbers[10], numbers[11])
-    element_walls, at = _walls_from(c, at, e, numbers[10], numbers[11])
+    walls, at = _walls_from(c, at, n, c[WATER], c[DEPTH])
+    element_walls, at = _walls_from(c, at, e, c[WATER], c[DEPTH])
     radius, at = _row(c, at, e)
     bearable, at = _row(c, at, e)
-    loads = Loads(weight, drag, Bed(bearing, diameter, numbers[3], numbers[4], numbers[5]))
-    ends = numbers[0] != 0.0, numbers[1] != 0.0
-    line = Line(length, stiffness, share, loads, mass, offset, inertia, spin_damping, added_mass, damping, ends[0], ends[1], numbers[2])
-    sea = Sea(levels, velocities, numbers[6], numbers[7], numbers[8], numbers[9] != 0.0)
-    limits = Limits(numbers[12], numbers[13], numbers[14], numbers[15], radius, bearable)
+    section, at = _row(c, at, e)
+    node_section, at = _row(c, at, n)
+    depths, at = _row(c, at, k)
+    factors, at = _row(c, at, k)
+    loads = Loads(weight, drag, Bed(bearing, diameter, c[BED_DAMPING], c[FRICTION], c[FRICTION_SPEED]))
+    ends = c[FOOT_CLAMPED] != 0.0, c[TOP_CLAMPED] != 0.0
+    line = Line(length, stiffness, share, loads, mass, offset, inertia, spin_damping, added_mass, damping, *ends, c[NUMERICAL_DAMPING])
+    sea = Sea(levels, velocities, c[CURRENT_START], c[RAMP], c[PERIOD], c[DRAG] != 0.0)
+    limits = Limits(c[DEEPEST], c[SURFACE], c[HIGHEST], c[NO_PULL], radius, bearable)
+    fixed = Fixed(section, node_section, depths, factors)
     return Unit(
-        s, line, MassPerLength(along, across), sea, walls, element_walls, limits, reference, int(c[PARTS]), c[YIELDS] != 0.0
+        s, line, MassPerLength(along, across), sea, walls, element_walls, limits, reference, int(c[PARTS]), c[YIELDS] != 0.0, top, fixed
     )
 
 
@@ -194,7 +196,5 @@ def loaded(vector, n, added_mass):
     added, at = _table(vector, at, n if added_mass else 0, 3)
     strain, at = _table(vector, at, n - 1, 7)
     chord, at = _table(vector, at, n - 1, 4)
-    pipe = PipeState(
-        vector[0], position, quaternion, velocity, rate, added, strain, chord, last, before, earlier, vector[1], works
-    )
+    pipe = PipeState(vector[0], position, quaternion, velocity, rate, added, strain, chord, last, before, earlier, vector[1], works)
     return Now(pipe, top, impedance, vector[2], vector[3], told)

@@ -130,7 +130,7 @@ def remarks(at: Prepared) -> list[str]:
     pipe = Pipe(at.pipe)
     state = pipe.at_rest(at.found)
     used = pipe.utilisation(state, pipe.section_forces(state))
-    found = [*validity.of_parameters(at.pipe), *validity.remarks(pipe, state, used)]
+    found = [*validity.of_parameters(at.pipe), *pipe.remarks(state, used)]
     if at.vessel is not None:
         found += native.started(at.vessel)[1]
     return list(dict.fromkeys(found))

@@ -6,13 +6,14 @@ import numpy as np
 
 from ..arrays import Array
 from ..compiled import inlined, kernel
-from ..element.strains import INSIDE_OUT, chords, inverted
+from ..element.strains import INSIDE_OUT, ROWS, chords, inverted
 from ..line import Line, Water
 from .energy import energies
 from .newton import solve_step
 from .state import WORKS, PipeState
 from .system import element_strains, folded
 
+_COUNT = len(WORKS)
 STIFF = np.zeros((6, 6))  # mobility of a top that moves as it is told
 # Searches for a step's solution: the guess of the mean velocities, from those of the last three steps; all but the first are damped
 _SEARCHES = ((3.0, -3.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -31,15 +32,16 @@ class StepResult(NamedTuple):
     flaw: int = 0  # what an element would be in the new state, see FLAWS
 
 
-def rest(line: Line, position: Array, quaternion: Array, time: float) -> PipeState:
+@kernel
+def rest(line, position, quaternion, time):
     """State of rest in a configuration."""
-    n = len(position)
-    strain = np.empty((n - 1, 7))
+    n = position.shape[0]
+    strain = np.empty((n - 1, ROWS))
     element_strains(line, position, quaternion, strain)
     zero, still = np.zeros((n, 3)), np.zeros((n, 6))
-    added_mass_velocity = np.zeros((len(line.added_mass), 3))
-    moved = position, quaternion, zero, zero, added_mass_velocity, strain, chords(line.length, position)
-    return PipeState(time, *moved, still, still, still, 0.0, np.zeros(len(WORKS)))
+    added_mass_velocity, works = np.zeros((line.added_mass.shape[0], 3)), np.zeros(_COUNT)
+    chord = chords(line.length, position)
+    return PipeState(time, position, quaternion, zero, zero, added_mass_velocity, strain, chord, still, still, still, 0.0, works)
 
 
 def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Array, h: float, mobility: Array = STIFF) -> StepResult:

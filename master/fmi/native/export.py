@@ -27,6 +27,7 @@ from ..ports import Ports
 from .machine import HERE, SOURCES, Machine, Platform, library
 from .tables import Row, unit_file
 
+_SIZES = 7  # numbers before a unit's constants, see kernels.c
 _OWN = (*SOURCES, "machine.py", "export.py", "tables.py")
 
 
@@ -108,13 +109,13 @@ def unit_data(name: str, guid: str, slave: UnitSlave, unit: Any, native: ModuleT
         else:
             rows.append(_parameter(variable.name, slave, fixed, numbers))
     n_outputs = max(part.stop for part, _ in places.values())
-    sizes = [5 + len(unit.constants), len(unit.state), len(ports.start), n_outputs, len(numbers)]
-    messages = [*native.MESSAGES, *(line.replace("%", "%%") for line in unit.remark.splitlines())]
+    remarks = [line.replace("%", "%%") for line in unit.remark.splitlines() if line not in _said_by_kernels(unit, native)]
+    sizes = [_SIZES + len(unit.constants), len(unit.state), len(ports.start), n_outputs, len(numbers), len(native.MESSAGES), len(remarks)]
     return unit_file(
         name,
         guid,
         rows,
-        messages,
+        [*native.MESSAGES, *remarks],
         constants=np.concatenate([np.array(sizes, dtype=float), unit.constants]),
         state=unit.state,
         inputs=ports.start,
@@ -122,6 +123,15 @@ def unit_data(name: str, guid: str, slave: UnitSlave, unit: Any, native: ModuleT
         n_outputs=n_outputs,
         n_groups=native.N_GROUPS,
     )
+
+
+def _said_by_kernels(unit: Any, native: ModuleType) -> list[str]:
+    """What the unit's kernels say of its start."""
+    words = importlib.import_module(f"{native.__package__}.notes")
+    notes, state = np.zeros(words.SIZE), unit.state.copy()
+    native.unit_start(unit.constants, unit.constants, unit.state, np.zeros(native.N_INPUTS), 0.0, state, notes)
+    said: list[str] = words.texts(notes, native.MESSAGES)
+    return said
 
 
 def _parameter(name: str, slave: UnitSlave, places: Mapping[str, int], numbers: list[float]) -> Row:

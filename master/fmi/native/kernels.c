@@ -1,6 +1,7 @@
 /* Between face.c and the unit's kernels, which numba has compiled: their way of taking arrays, and what they need of numba's runtime.
 
-   The constants begin with the sizes of all vectors, which the kernels take from their arrays. Kernels for two kinds of processor may be
+   The constants begin with the sizes of all vectors, which the kernels take from their arrays, and with the numbers of the messages that an
+   unchanged unit has for its start, beside what the kernels say. Kernels for two kinds of processor may be
    there, of which the better one that this processor is of is taken. A kernel that fails where it cannot, without memory, gives an error. */
 #include "face.h"
 
@@ -46,7 +47,7 @@ int numba_attempt_nocopy_reshape(int64_t nd, const int64_t *dims, const int64_t 
 
 /* the kernels */
 
-enum { N_CONSTANTS, N_STATE, N_INPUTS, N_OUTPUTS, N_PARAMETERS, N_SIZES };
+enum { N_CONSTANTS, N_STATE, N_INPUTS, N_OUTPUTS, N_PARAMETERS, FIRST_REMARK, N_REMARKS, N_SIZES };
 #define ARRAY void *, void *, int64_t, int64_t, double *, int64_t, int64_t
 #define GIVE(vector, size) NULL, NULL, (size), 8, (double *)(vector), (size), 8
 #define CONSTANTS(c) GIVE((c) + N_SIZES, (int64_t)(c)[N_CONSTANTS] - N_SIZES)
@@ -93,12 +94,27 @@ int64_t unit_constants(const double *exported, const double *parameters, double 
     return done ? status : ERROR;
 }
 
+/* Put the remarks of an unchanged unit before the notes. */
+static void add_remarks(const double *constants, double *notes) {
+    double *end = notes + 1;
+    for (double left = notes[0]; left > 0; left--) end += 3 + (int64_t)end[2];
+    int64_t n = (int64_t)constants[N_REMARKS], shift = 3 * n;
+    if (end + shift > notes + N_NOTES) return;
+    memmove(notes + 1 + shift, notes + 1, (size_t)(end - notes - 1) * sizeof *notes);
+    for (int64_t i = 0; i < n; i++) {
+        double *at = notes + 1 + 3 * i;
+        at[0] = WARNING, at[1] = constants[FIRST_REMARK] + (double)i, at[2] = 0;
+    }
+    notes[0] += (double)n;
+}
+
 int64_t unit_start(const double *constants, const double *exported, const double *exported_state, const double *inputs, double time, double *state,
                    double *notes) {
     int64_t status = ERROR;
     void *failure = NULL;
     int done = !CALL(start, &status, &failure, CONSTANTS(constants), CONSTANTS(exported), SIZED(constants, exported_state, N_STATE),
                      SIZED(constants, inputs, N_INPUTS), time, SIZED(constants, state, N_STATE), NOTES);
+    if (done && status == OK && equal(constants, exported, (int64_t)exported[N_CONSTANTS])) add_remarks(constants, notes);
     return done ? status : ERROR;
 }
 
