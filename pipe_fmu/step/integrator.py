@@ -29,7 +29,7 @@ class StepResult(NamedTuple):
     impedance: Array  # (6, 6) d top / d (mean velocity, mean angular velocity)
     iterations: int
     residual: float  # over the largest element force and 1e-3 of the inertial terms
-    flaw: int = 0  # what an element would be in the new state, see FLAWS
+    flaw: str = ""  # what an element would be in the new state, for which the step is refused; else empty
 
 
 @kernel
@@ -50,12 +50,14 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     water: at the middle of the step; velocity, spin (3,): mean velocity and angular velocity of the top, in e; or those that it
     would have without the pipe, where it yields to the pipe's pull with `mobility` (6, 6), the derivative of the one by the other.
     """
-    return StepResult(*search(line, water, state, velocity, spin, h, mobility))
+    converged, new, *others, flaw = search(line, water, state, velocity, spin, h, mobility)
+    return StepResult(converged, new if converged else state, *others, FLAWS[flaw])
 
 
 @inlined
 def search(line, water, state, velocity, spin, h, mobility):
-    """A step by the first of the searches that ends in a configuration of a line; the fields of a StepResult."""
+    """A step by the first of the searches that ends in a configuration of a line; the fields of a StepResult, but a
+    number of FLAWS for the flaw."""
     spent, done, flaw = 0, False, 0
     for k in range(len(_SEARCHES)):
         converged, new, top, impedance, iterations, residual = solve_step(
