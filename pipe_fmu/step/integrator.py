@@ -50,8 +50,8 @@ def step(line: Line, water: Water, state: PipeState, velocity: Array, spin: Arra
     water: at the middle of the step; velocity, spin (3,): mean velocity and angular velocity of the top, in e; or those that it
     would have without the pipe, where it yields to the pipe's pull with `mobility` (6, 6), the derivative of the one by the other.
     """
-    converged, new, *others, flaw = search(line, water, state, velocity, spin, h, mobility)
-    return StepResult(converged, new if converged else state, *others, FLAWS[flaw])
+    converged, new, top, impedance, iterations, residual, flaw = search(line, water, state, velocity, spin, h, mobility)
+    return StepResult(converged, new if converged else state, top, impedance, iterations, residual, FLAWS[flaw])
 
 
 @inlined
