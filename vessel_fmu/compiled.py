@@ -33,7 +33,8 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise ImportError("NUMBA_DISABLE_JIT is set, but the kernels can only run compiled")
 drop_stale_cache(Path(__file__).parent)
 
-kernel = njit(cache=True, error_model="numpy")
-inlined = njit(cache=True, error_model="numpy", inline="always")
+_PLAIN: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _BARE: dict[str, Any] = {"_nrt": False, "fastmath": {"contract", "arcp", "nsz", "reassoc"}}
-inner = njit(cache=True, error_model="numpy", **_BARE)
+kernel = njit(**_PLAIN)
+inlined = njit(**_PLAIN, inline="always")
+inner = njit(**_PLAIN, **_BARE)
