@@ -214,6 +214,8 @@ def test_an_export_is_sound_small_and_has_all_platforms(exported, unit):
     assert not any(name.endswith(".py") for name in names)
     assert any(name.startswith("documentation/licenses/pipelay/") for name in names)
     assert (exported / f"{unit}.fmu").stat().st_size < 2.2e6
+    text = zipfile.ZipFile(exported / f"{unit}.fmu").read("documentation/index.html").decode()
+    assert text.count("(fixed at export)") >= 1
 
 
 def started(command):

@@ -11,6 +11,7 @@ import tempfile
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -22,6 +23,7 @@ from .. import cache, licenses, schema
 from ..adapter import UnitSlave
 from ..build import CAPABILITIES, EPOCH, Recipe, about, content
 from ..cache import cache_folder
+from ..description import Variable
 from ..document import icon_png, page_html
 from ..ports import Ports
 from .machine import HERE, SOURCES, Machine, Platform, library
@@ -69,8 +71,19 @@ def _described(recipe: Recipe, unit: Any, native: ModuleType, digest: str) -> di
         facts = {"about": {**about(recipe), "guid": guid}, **content(recipe)}
         Path(folder, "fmu.json").write_text(json.dumps(facts), encoding="utf-8")
 
+        free = native.value_places(unit.parameters)
+
         class Slave(UnitSlave):
             unit_class = type(unit)
+
+            def variables(self) -> list[Variable]:
+                """See UnitSlave; the description says of a parameter whether it is fixed at export."""
+                return [
+                    replace(it, doc=f"{it.doc} (fixed at export)".strip())
+                    if it.causality == "parameter" and self.own_name(it.name) not in free
+                    else it
+                    for it in super().variables()
+                ]
 
         slave = Slave(instance_name=recipe.name, resources=folder, visible=False)
     model = slave.to_xml({name: str(value).lower() for name, value in (CAPABILITIES | {"needsExecutionTool": False}).items()})
@@ -86,6 +99,7 @@ def _described(recipe: Recipe, unit: Any, native: ModuleType, digest: str) -> di
         "resources/unit.bin": unit_data(recipe.name, guid, slave, unit, native),
         **licenses.entry(recipe.name, recipe.license, recipe.author),
         **licenses.of_package("pipelay"),
+        **licenses.of_package("numba"),
     }
 
 
