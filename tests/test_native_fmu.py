@@ -93,10 +93,18 @@ def agree(one, other, port, what):
     assert np.abs(ours - theirs).max() <= max(tolerance, 1e-9 * (1.0 if port.startswith("end_moment") else 0.0)), f"{port} {what}"
 
 
+@pytest.fixture(scope="module")
+def both_kinds():
+    """For every scene its FMUs in machine code and those run by Python."""
+    mappings = json.dumps([load(name).mapping for name in SCENES], default=str)
+    command = [sys.executable, "-P", str(HERE / "prepare_many.py")]
+    done = subprocess.run(command, input=mappings, capture_output=True, text=True, check=True)
+    return dict(zip(SCENES, json.loads(done.stdout), strict=True))
+
+
 @pytest.mark.parametrize("name", SCENES)
-def test_call_by_call_it_is_the_fmu_run_by_python(name):
-    scene = load(name)
-    native, python = prepare(scene), prepare(scene, ["--python"])
+def test_call_by_call_it_is_the_fmu_run_by_python(name, both_kinds):
+    native, python = both_kinds[name]
     for unit in native:
         with Fmu(native[unit]) as ours, Fmu(python[unit]) as theirs:
             both = ours, theirs
