@@ -8,6 +8,7 @@ An `inner` kernel allocates no array, so those it is given need no counting of r
 may be rearranged in it (fused multiply-add), while NaN and infinity keep their meaning.
 """
 
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,19 @@ def drop_stale_cache(package: Path) -> int:
     if not os.access(package, os.W_OK):
         return 0  # numba keeps its cache elsewhere
     newest = max(source.stat().st_mtime for source in package.rglob("*.py"))
-    if all(index.stat().st_mtime >= newest for index in indices):
+    if all(_modified(index) >= newest for index in indices):
         return 0
     for index in indices:
         index.unlink(missing_ok=True)
     return len(indices)
+
+
+def _modified(index: Path) -> float:
+    """When a file was last written; one that another process has just dropped is as good as new."""
+    try:
+        return index.stat().st_mtime
+    except FileNotFoundError:
+        return math.inf
 
 
 if config.DISABLE_JIT:  # type: ignore[attr-defined]
