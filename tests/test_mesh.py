@@ -100,29 +100,33 @@ SWINGING = [
 ]
 
 
+def errors_over_those_of_equal_lengths(line, counts):
+    """Errors of position, top force and bending moment against 193 nodes at the same step, root mean square over the numbers of nodes
+    `counts`, over those of equal lengths."""
+    waves = {"top_amplitude": float(np.linalg.norm(line.amplitude))}
+    exact = history(line, nodes=193, **waves)
+    meshes = waves, {"mesh": "uniform"}
+    adapted, even = ([distance(history(line, nodes=count, **mesh), exact) for count in counts] for mesh in meshes)
+    ratio = np.sqrt(np.mean(np.square(adapted), axis=0) / np.mean(np.square(even), axis=0))
+    sys.stdout.write("{}: error over that of equal lengths {:.2f} position, {:.2f} top force, {:.2f} moment\n".format(line.name, *ratio))
+    return ratio
+
+
 @pytest.mark.parametrize("line", SWINGING, ids=[line.name for line in SWINGING])
 def test_in_motion_the_adapted_mesh_is_as_good_as_equal_lengths_or_better(line):
-    """48 nodes, against 193 at the same step: never more than 1.3 times the error in position, top force or bending moment."""
-    adapted, exact = (history(line, nodes=nodes, top_amplitude=float(np.linalg.norm(line.amplitude))) for nodes in (48, 193))
-    even = history(line, nodes=48, mesh="uniform")
-    ratio = distance(adapted, exact) / distance(even, exact)
-    sys.stdout.write("{}: error over that of equal lengths {:.2f} position, {:.2f} top force, {:.2f} moment\n".format(line.name, *ratio))
+    """48 nodes: never more than 1.3 times the error in position, top force or bending moment."""
+    ratio = errors_over_those_of_equal_lengths(line, [48])
     assert (ratio < 1.3).all()
     assert ratio.prod() < 1.02  # all in all no loss anywhere
 
 
 @pytest.mark.parametrize("line", SWINGING if EVERY else SWINGING[1:5], ids=lambda line: line.name)
 def test_with_half_as_many_nodes_the_adapted_mesh_loses_nothing_in_motion_all_in_all(line):
-    """22 to 26 nodes, root mean square of the five: so few hardly resolve the waves, and the ratio at one count is one of two lucks (a
-    mesh within 3 % of equal lengths has 1.5 times their error at one count and less than it at the next). The top force of a line that
-    snaps is resolved by neither; it is in the product.
+    """22 to 26 nodes: so few hardly resolve the waves, and the ratio at one count is one of two lucks (a mesh within 3 % of equal lengths
+    has 1.5 times their error at one count and less than it at the next). The top force of a line that snaps is resolved by neither; it is
+    in the product.
     """
-    counts = range(22, 27)
-    exact = history(line, nodes=193, top_amplitude=float(np.linalg.norm(line.amplitude)))
-    meshes = {"top_amplitude": float(np.linalg.norm(line.amplitude))}, {"mesh": "uniform"}
-    adapted, even = ([distance(history(line, nodes=count, **mesh), exact) for count in counts] for mesh in meshes)
-    ratio = np.sqrt(np.mean(np.square(adapted), axis=0) / np.mean(np.square(even), axis=0))
-    sys.stdout.write("{}: error over that of equal lengths {:.2f} position, {:.2f} top force, {:.2f} moment\n".format(line.name, *ratio))
+    ratio = errors_over_those_of_equal_lengths(line, range(22, 27))
     assert (ratio[[0, 2]] < 1.05).all()
     assert ratio.prod() < 1.02
 

@@ -81,8 +81,14 @@ def chords(length, position):
     for e in range(length.shape[0]):
         d = chord(position.T, e, e + 1)
         out[e, 0], out[e, 1], out[e, 2] = d
-        out[e, 3] = dot(d, d) - length[e] * length[e]
+        out[e, 3] = excess(d, length[e])
     return out
+
+
+@inner
+def excess(d, h):
+    """Excess of the square of a chord d over that of the length h [m2]."""
+    return dot(d, d) - h * h
 
 
 @inner
@@ -108,12 +114,12 @@ def barrier(u):
 
 
 @inner
-def strains(rm, u, psi, excess, h, share, out):
-    """Strains 0-5 and the sag 6 of one element into `out` (7,); excess: of |u|^2 over h^2; `share` (2,) holds p_2, p_3."""
+def strains(rm, u, psi, beyond, h, share, out):
+    """Strains 0-5 and the sag 6 of one element into `out` (7,); beyond: the `excess` of its chord; `share` (2,) holds p_2, p_3."""
     z = dot(psi, psi)
     chi = chi_of(z)[0]
     along = dot(psi, u)
-    longer = excess + chi * (2.0 + z * chi) * (z * dot(u, u) - along * along)  # l^2 - h^2
+    longer = beyond + chi * (2.0 + z * chi) * (z * dot(u, u) - along * along)  # l^2 - h^2
     length = math.sqrt(h * h + longer)
     s2, s3 = chord_shear(u, psi, h)
     f, _ = barrier(u)

@@ -17,8 +17,8 @@ def room(n):
 
 
 @inner
-def _fill(a, k, out, beyond):
-    """a[:, k] into out, and behind its end `beyond` times its last entry."""
+def fill_column(a, k, out, beyond=1.0):
+    """Component k of a (m, k) into out (p,), the last entry repeated `beyond` times it."""
     m = a.shape[0]
     for i in range(m):
         out[i] = a[i, k]
@@ -30,7 +30,7 @@ def _fill(a, k, out, beyond):
 def fill(a, out, beyond=1.0):
     """Transpose of a (m, k) into out (k, p), the last row of a repeated `beyond` times it."""
     for k in range(a.shape[1]):
-        _fill(a, k, out[k], beyond)
+        fill_column(a, k, out[k], beyond)
 
 
 @inner

@@ -5,9 +5,8 @@ import numpy as np
 from ..compiled import kernel
 from ..element.assembly import add_matrix, add_vector, clear, expand, expand_matrix
 from ..element.geometric_stiffness import geometric_stiffness
-from ..element.strains import ROWS, STRAINS, frame, gradients, strains
+from ..element.strains import ROWS, STRAINS, excess, frame, gradients, strains
 from ..loads import NO_ENERGY, add_static_loads, press_sag, summed
-from ..maths.so3 import dot
 from ..simd.columns import attitude, chord
 
 
@@ -37,7 +36,7 @@ def static_system(line, water, position, quaternion, diagonal, lower, upper, res
     for e in range(line.length.shape[0]):
         h = line.length[e]
         arc = frame(attitude(quaternion.T, e), attitude(quaternion.T, e + 1), chord(position.T, e, e + 1))
-        strains(*arc, dot(arc[1], arc[1]) - h * h, h, line.share[e], strain)
+        strains(*arc, excess(arc[1], h), h, line.share[e], strain)
         gradients(*arc, h, line.share[e], rows)
         for k in range(STRAINS):
             stress[k] = h * line.stiffness[e, k] * strain[k]

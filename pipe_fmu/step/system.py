@@ -22,10 +22,10 @@ import numpy as np
 
 from ..compiled import inner, kernel
 from ..element.assembly import clear
-from ..element.strains import ROWS, chords, frame, strains
+from ..element.strains import ROWS, chords, excess, frame, strains
 from ..line import line_columns
-from ..maths.so3 import dot, exp, multiply, scale
-from ..simd.columns import attitude, chord, columns, fill, fill_straight, room, take, vector_of
+from ..maths.so3 import exp, multiply, scale
+from ..simd.columns import attitude, chord, columns, fill, fill_column, fill_straight, room, take, vector_of
 from ..simd.lane_arrays import group, row
 from ..simd.lanes import WIDTH, largest, total
 from .elements import add_elements
@@ -46,7 +46,7 @@ def element_strains(line, position, quaternion, out):
         a, b = group(first), group(first + 1)
         d, h, one = chord(positions, a, b), line.length[a], row(7)
         rm, u, psi = frame(attitude(quaternions, a), attitude(quaternions, b), d)
-        strains(rm, u, psi, dot(d, d) - h * h, h, (line.share[0, a], line.share[1, a]), one)
+        strains(rm, u, psi, excess(d, h), h, (line.share[0, a], line.share[1, a]), one)
         for k in range(ROWS):
             found[k, a] = one[k]
     take(found, out)
@@ -59,8 +59,10 @@ def old_columns(position, quaternion, velocity, rate, added_mass_velocity, strai
     """
     n = position.shape[0]
     p = room(n)
+    z = np.empty(p)
+    fill_column(position, 2, z)
     old = (
-        columns(position, n, 1.0)[2],
+        z,
         columns(quaternion, n, 1.0),
         columns(velocity, n, 1.0),
         columns(rate, n, 1.0),
@@ -94,7 +96,8 @@ def step_system(
     `newton_friction`: see loads.bed.add_mean_contact.
 
     position, velocity (n, 3), quaternion (n, 4), rate (n, 3) body rates, added_mass_velocity (n, 3) or (0, 3) in the section's frame,
-    strain (n - 1, 7): old state. Fills new_strain (n - 1, 7) and works (len(WORKS),). Returns (force scale [N], moment scale [N m]).
+    strain (n - 1, 7): old state, whose chords are those of the positions. Fills new_strain (n - 1, 7) and works (len(WORKS),). Returns
+    (force scale [N], moment scale [N m]).
     """
     old, new = old_columns(position, quaternion, velocity, rate, added_mass_velocity, strain, chords(line.length, position))
     scales = assemble(line_columns(line), water, h, old, new, x, with_tangent, newton_friction, system, works)
