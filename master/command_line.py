@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from master.errors import RunError, UsageError
 from master.fmi.failure import visible
@@ -44,74 +45,43 @@ class _Parser(argparse.ArgumentParser):
             drop(stream)
 
 
+class _Command(NamedTuple):
+    """What `--help` says of a command, and what adds its options."""
+
+    short: str
+    epilog: str
+    options: Callable[[argparse.ArgumentParser], None] = lambda to: None
+
+
 def parser() -> argparse.ArgumentParser:
     """The commands and their options."""
     raw = argparse.RawDescriptionHelpFormatter
     about = "A geometrically exact offshore pipe and its vessel as two FMUs, coupled with an energy-checked master."
     top = _Parser("pipelay", description=about, epilog=EPILOG, formatter_class=raw)
     subparsers = top.add_subparsers(metavar="COMMAND", required=True)
-
-    def command(name: str, short: str, epilog: str) -> argparse.ArgumentParser:
+    for name, (short, epilog, options) in _COMMANDS.items():
         added = subparsers.add_parser(name, help=short, description=short, epilog=epilog, formatter_class=raw)
         added.set_defaults(command=name.replace("-", "_"))  # a function of `master.commands`
-        return added
-
-    run = command(
-        "run",
-        "Simulate a scene; write signals, shapes, figures and a summary.",
-        "files written: signals.csv, shapes.npz, fig3_*.png to fig9_*.png, energy.png, summary.json\n\n"
-        "Ctrl-C ends a run early and keeps what was computed.",
-    )
-    _scene_arguments(run, optional=True)
-    run.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the results (default: results/SCENE)")
-
-    statics = command(
-        "statics",
-        "Find the static equilibrium of a scene and print its forces.",
-        "Forces and moments act on the pipe; components are x forward, y starboard, z down.",
-    )
-    _scene_arguments(statics, optional=False)
-    statics.add_argument("--json", action="store_true", help="print JSON, with arrays over the nodes")
-
-    export = command(
-        "export",
-        "Write the units of a scene as FMUs (FMI 2.0 co-simulation).",
-        "The equilibrium of the scene is built in as the start of both FMUs.",
-    )
-    export.add_argument("--scene", default="paper", metavar="SCENE", help="scene the FMUs belong to (default: paper)")
-    _set_argument(export)
-    export.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path(), help="folder (default: here)")
-    portable = "put Python and compiled kernels into the FMUs, for machines without them (Linux x86-64; 100 MB each)"
-    export.add_argument("--portable", action="store_true", help=portable)
-
-    command(
-        "scenes", "List the built-in scenes.", "Copy one of their files for a scene of your own; `pipelay keys` lists what it may say."
-    )
-    command(
-        "keys",
-        "List what a scene of pipe and vessel may say: keys, defaults, units.",
-        "Lists of tables have [] behind their names; defaults in brackets act only where their table stands in the scene.",
-    )
-    stability = command(
-        "stability",
-        "Run the coupling's stability cases; write their tables and a stability map.",
-        "files written: published.csv, limits.csv, stability_map.csv, stability_map.png, bodies.csv; all of it takes about ten minutes",
-    )
-    _study_arguments(stability, "oscillator, schueller, quarter-car, manipulator, limits, bodies")
-
-    hard = command(
-        "hard-cases",
-        "Run the pipe alone where simulations of lines fail, each case at three steps.",
-        "file written: hard-cases.csv; all of it takes ten seconds once compiled",
-    )
-    _study_arguments(hard, "the cases by their names")
-    measured = command(
-        "bench",
-        "Measure CPU time against error, beside other codes; costs of nodes, of physics and of the start.",
-        "files written: CASE.csv, and CASE.png where error is measured; all of it takes half an hour",
-    )
-    _study_arguments(measured, "heave, snap, paper, statics, costs, nodes, start")
+        options(added)
     return top
+
+
+def _run_options(to: argparse.ArgumentParser) -> None:
+    _scene_arguments(to, optional=True)
+    to.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the results (default: results/SCENE)")
+
+
+def _statics_options(to: argparse.ArgumentParser) -> None:
+    _scene_arguments(to, optional=False)
+    to.add_argument("--json", action="store_true", help="print JSON, with arrays over the nodes")
+
+
+def _export_options(to: argparse.ArgumentParser) -> None:
+    to.add_argument("--scene", default="paper", metavar="SCENE", help="scene the FMUs belong to (default: paper)")
+    _set_argument(to)
+    to.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path(), help="folder (default: here)")
+    python = "make FMUs that are run by a Python with numpy and numba on the machine (Linux), not machine code: for changed models"
+    to.add_argument("--python", action="store_true", help=python)
 
 
 def _scene_arguments(to: argparse.ArgumentParser, *, optional: bool) -> None:
@@ -132,6 +102,49 @@ def _study_arguments(to: argparse.ArgumentParser, cases: str) -> None:
 def _set_argument(to: argparse.ArgumentParser) -> None:
     about = "change one value of the scene: dotted key, TOML value; may be repeated"
     to.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes", help=about)
+
+
+_COMMANDS = {
+    "run": _Command(
+        "Simulate a scene; write signals, shapes, figures and a summary.",
+        "files written: signals.csv, shapes.npz, fig3_*.png to fig9_*.png, energy.png, summary.json\n\n"
+        "Ctrl-C ends a run early and keeps what was computed.",
+        _run_options,
+    ),
+    "statics": _Command(
+        "Find the static equilibrium of a scene and print its forces.",
+        "Forces and moments act on the pipe; components are x forward, y starboard, z down.",
+        _statics_options,
+    ),
+    "export": _Command(
+        "Write the units of a scene as FMUs (FMI 2.0 co-simulation).",
+        "The equilibrium of the scene is built in as the start of both FMUs.",
+        _export_options,
+    ),
+    "scenes": _Command(
+        "List the built-in scenes.",
+        "Copy one of their files for a scene of your own; `pipelay keys` lists what it may say.",
+    ),
+    "keys": _Command(
+        "List what a scene of pipe and vessel may say: keys, defaults, units.",
+        "Lists of tables have [] behind their names; defaults in brackets act only where their table stands in the scene.",
+    ),
+    "stability": _Command(
+        "Run the coupling's stability cases; write their tables and a stability map.",
+        "files written: published.csv, limits.csv, stability_map.csv, stability_map.png, bodies.csv; all of it takes about ten minutes",
+        partial(_study_arguments, cases="oscillator, schueller, quarter-car, manipulator, limits, bodies"),
+    ),
+    "hard-cases": _Command(
+        "Run the pipe alone where simulations of lines fail, each case at three steps.",
+        "file written: hard-cases.csv; all of it takes ten seconds once compiled",
+        partial(_study_arguments, cases="the cases by their names"),
+    ),
+    "bench": _Command(
+        "Measure CPU time against error, beside other codes; costs of nodes, of physics and of the start.",
+        "files written: CASE.csv, and CASE.png where error is measured; all of it takes half an hour",
+        partial(_study_arguments, cases="heave, snap, paper, statics, costs, nodes, start"),
+    ),
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

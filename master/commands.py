@@ -58,7 +58,7 @@ def export(options: argparse.Namespace) -> int:
         except OSError as error:
             raise unwritable(folder, error) from None
         with unfinished as place, patience(terminal()):
-            fmus = prepare(scene, ["--export", place, *(["--portable"] if options.portable else [])])
+            fmus = prepare(scene, ["--export", place, *(["--python"] if options.python else [])])
             simulation = scene.sections.simulation
             joined = write_system(fmus, Path(place), simulation.macro_step, simulation.duration) if "vessel" in fmus else []
             written = _moved([*fmus.values(), *joined], folder)

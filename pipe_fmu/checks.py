@@ -65,8 +65,13 @@ def unusual(instance: Any, path: str) -> Iterator[str]:
             elif part and "usual" in item.metadata:
                 low, high = item.metadata["usual"]
                 if not low <= part <= high:
-                    unit = "" if item.metadata["unit"] == "1" else f" {item.metadata['unit']}"
-                    yield f"{where} = {part:g}{unit}: usually {low:g} to {high:g}; is it in this unit?"
+                    yield f"{where} = {part:g}{usually(item.metadata)}"
+
+
+def usually(metadata: Any) -> str:
+    """What is said after a number that is beyond the `usual` of its metadata."""
+    unit, (low, high) = metadata["unit"], metadata["usual"]
+    return f"{'' if unit == '1' else f' {unit}'}: usually {low:g} to {high:g}; is it in this unit?"
 
 
 def shown(value: float) -> str:

@@ -3,7 +3,8 @@
 from typing import NamedTuple
 
 from .arrays import Array
-from .compiled import kernel
+from .compiled import inner, kernel
+from .environment import time_factor
 from .loads import Loads, loads_columns
 from .simd.columns import column, columns
 
@@ -34,9 +35,32 @@ class Water(NamedTuple):
     drag: bool
 
 
-def shear_stiffness(shear: Array, bending: Array, length: Array) -> tuple[Array, Array]:
-    """Chord shear stiffness K [N] and bending share p of elements: 1/K = 1/GA + h^2/(12 EI) (see element/strains.py)."""
-    flexibility = length**2 / (12.0 * bending)
+class Sea(NamedTuple):
+    """The current over time: its profile at full strength, and the times of `environment.time_factor` [s]."""
+
+    levels: Array  # (k,) ascending depth coordinate z [m]; k = 0 means still water
+    velocities: Array  # (k, 3) [m/s]
+    start: float
+    ramp: float
+    period: float
+    drag: bool
+
+
+_factor = kernel(time_factor)
+
+
+@kernel
+def water_at(sea, time):
+    """The water of a sea at `time` [s]."""
+    factor = _factor(time, sea.start, sea.ramp, sea.period) if sea.levels.shape[0] > 0 else 0.0
+    count = sea.levels.shape[0] if factor != 0.0 else 0
+    return Water(sea.levels[:count], factor * sea.velocities[:count], sea.drag)
+
+
+@inner
+def shear_stiffness(shear, bending, length):
+    """Chord shear stiffness K [N] and bending share p of an element: 1/K = 1/GA + h^2/(12 EI) (see element/strains.py)."""
+    flexibility = length * length / (12.0 * bending)
     stiffness = 1.0 / (1.0 / shear + flexibility)
     return stiffness, flexibility * stiffness
 

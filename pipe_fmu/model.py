@@ -1,21 +1,21 @@
-"""From parameters to the discretised line."""
+"""Where the nodes of a pipe are placed."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from . import mesh
 from .arrays import Array
+from .constants import constants_on
 from .element.strains import ROWS
-from .line import Line, Water, shear_stiffness
-from .loads import loads_of
-from .parameters import PipeParameters, Section
+from .line import water_at
+from .parameters import PipeParameters
 from .results import section_forces
 from .statics import catenary
 from .statics.solve import solve
 from .step.system import element_strains
+from .vectors import Unit, unpacked
 
 _PROBE = (4, 8)  # elements of the probing mesh for one of the mesh to be made; the finer where the other finds no equilibrium,
 _PROBE_LIMIT = 2000  # as long as there are fewer than these
@@ -43,10 +43,16 @@ def resolve(parameters: PipeParameters) -> PipeParameters:
     raise ValueError(f"tolerance = {parameters.tolerance:g}: must be within reach of {_TRIES[-1]} elements")
 
 
-def discretize(parameters: PipeParameters) -> tuple[Array, Line]:
-    """Arc lengths S (n,) [m] of the nodes, and the line. Raises ValueError as `resolve` does."""
-    s = np.array(resolve(parameters).nodes_at)
-    return s, _line(parameters, s)
+def constants(parameters: PipeParameters) -> Array:
+    """Constants of a unit, its nodes placed. Raises ValueError as `resolve` does."""
+    placed = resolve(parameters)
+    return constants_on(placed, np.array(placed.nodes_at))
+
+
+def unit_on(parameters: PipeParameters, s: Array) -> Unit:
+    """The unit with its nodes at `s` (n,) [m]."""
+    unit: Unit = unpacked(constants_on(parameters, s))
+    return unit
 
 
 def _mesh(parameters: PipeParameters, count: int) -> Array:
@@ -85,7 +91,8 @@ def _stiffest(parameters: PipeParameters) -> float:
 
 def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
     """Nodal section forces (n, 6), material components, of the equilibrium on nodes `s` (n,), if there is one."""
-    line, calm = _line(parameters, s), water(parameters, 0.0)
+    unit = unit_on(parameters, s)
+    line, calm = unit.line, water_at(unit.sea, 0.0)
     attitude = np.array(parameters.top_quaternion)
     found = solve(line, s, calm, parameters.top_position, attitude if attitude.any() else None)
     if not found.converged:
@@ -93,8 +100,7 @@ def _at_rest(parameters: PipeParameters, s: Array) -> Array | None:
     strain = np.empty((len(s) - 1, ROWS))
     element_strains(line, found.position, found.quaternion, strain)
     zero = np.zeros_like(found.position)
-    mass = mass_per_length(parameters, s)
-    return section_forces.nodal_wrenches(line, mass, calm, found.position, found.quaternion, zero, zero, strain)
+    return section_forces.nodal_wrenches(line, unit.mass, calm, found.position, found.quaternion, zero, zero, strain)
 
 
 def _error(parameters: PipeParameters, s: Array, parts: int) -> float:
@@ -116,74 +122,6 @@ def _placed(parameters: PipeParameters, s: Array) -> PipeParameters:
     return replace(parameters, nodes=len(s), nodes_at=tuple(float(x) for x in s), tolerance=None)
 
 
-def _line(parameters: PipeParameters, s: Array) -> Line:
-    """Element and node data on the nodes `s` (n,)."""
-    h = np.diff(s)
-    section = _picker(parameters, s)
-    stiffness = section(lambda one: one.stiffness)
-    k2, p2 = shear_stiffness(stiffness[:, 1], stiffness[:, 4], h)
-    k3, p3 = shear_stiffness(stiffness[:, 1], stiffness[:, 3], h)
-    carried = mass_per_length(parameters, s)
-    mass = carried.along
-    added = np.zeros((0, 3))
-    if parameters.added_mass is not None:
-        across = carried.across - mass
-        added = _lump(np.column_stack([0.0 * across, across, across]), h)
-    line = Line(
-        length=h,
-        stiffness=np.column_stack([stiffness[:, 0], k2, k3, stiffness[:, 2:]]),
-        share=np.column_stack([p2, p3]),
-        loads=loads_of(parameters, section, _by_section(parameters, s, np.array(parameters.bearing()))),
-        mass=_lump(mass[:, None], h)[:, 0],
-        offset=_ahead(carried.across, h),
-        inertia=_lump(section(lambda one: one.inertia), h),
-        spin_damping=_lump(section(lambda one: one.rotational_damping), h),
-        added_mass=added,
-        damping=np.full(len(h) if parameters.internal_damping > 0.0 else 0, parameters.internal_damping),
-        foot_clamped=parameters.foot == "clamped",
-        top_clamped=parameters.top == "clamped",
-        numerical_damping=float(parameters.numerical_damping),
-    )
-    return line
-
-
-def _ahead(mass: Array, h: Array) -> Array:
-    """Centres of the lumped masses ahead of their nodes (n,) [m]: the couples m h^2 / 12 of both elements over the mass m h / 2 of both."""
-    couple, share = mass * h * h / 12.0, 0.5 * mass * h
-    return np.diff(couple, prepend=0.0, append=0.0) / (np.append(share, 0.0) + np.append(0.0, share))
-
-
-def mass_per_length(parameters: PipeParameters, s: Array) -> section_forces.MassPerLength:
-    """Mass per length of the elements between the nodes `s` (n,), along the section and across it."""
-    section = _picker(parameters, s)
-    along = section(lambda one: one.mass_per_length)
-    added = 0.0 if parameters.added_mass is None else parameters.added_mass.coefficient * parameters.environment.water_density
-    return section_forces.MassPerLength(along, along + added * section(lambda one: one.outer_area))
-
-
-def water(parameters: PipeParameters, time: float) -> Water:
-    """The water at `time` [s]."""
-    return waters(parameters)(time)
-
-
-def waters(parameters: PipeParameters) -> Callable[[float], Water]:
-    """The water as a function of time [s]."""
-    environment = parameters.environment
-    sticks = any(section.drag_normal > 0.0 or section.drag_tangential > 0.0 for section in parameters.all_sections)
-    current, still = environment.current, Water(np.zeros(0), np.zeros((0, 3)), sticks)
-    if current is None:
-        return lambda time: still
-    depths, factors = current.shape(environment.depth)
-    levels = np.array(depths) - environment.depth  # from the surface down, so ascending in z
-    flow = np.outer(factors, current.velocity)
-
-    def at(time: float) -> Water:
-        factor = current.time_factor(time)
-        return Water(levels, factor * flow, sticks) if factor != 0.0 else still
-
-    return at
-
-
 def estimate_tension(parameters: PipeParameters) -> tuple[float, float]:
     """Tension [N] at foot and top of the catenary of the same weight, or of the bar that is stretched, if that gives way first."""
     x, y, z = parameters.top_position
@@ -202,26 +140,3 @@ def estimate_tension(parameters: PipeParameters) -> tuple[float, float]:
 def _mean_weight(parameters: PipeParameters) -> float:
     sections = parameters.all_sections
     return sum(parameters.weight(section) * (section.length or parameters.length) for section in sections) / parameters.length
-
-
-def _picker(parameters: PipeParameters, s: Array) -> Callable[[Callable[[Section], object]], Array]:
-    """Function that lists a property of the section of every element."""
-    def pick(property_of: Callable[[Section], object]) -> Array:
-        return _by_section(parameters, s, np.array([property_of(section) for section in parameters.all_sections], dtype=float))
-
-    return pick
-
-
-def _by_section(parameters: PipeParameters, s: Array, table: Array) -> Array:
-    """For every element the row of `table` that belongs to its section."""
-    ends = np.cumsum([section.length or parameters.length for section in parameters.all_sections])
-    picked: Array = table[np.searchsorted(ends, 0.5 * (s[1:] + s[:-1]))]
-    return picked
-
-
-def _lump(per_length: Array, h: Array) -> Array:
-    """Nodal sums (n, k) of a quantity per length (n - 1, k), half of every element to each end."""
-    out = np.zeros((len(h) + 1, per_length.shape[1]))
-    out[:-1] += 0.5 * h[:, None] * per_length
-    out[1:] += 0.5 * h[:, None] * per_length
-    return out

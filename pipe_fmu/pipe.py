@@ -2,15 +2,19 @@
 
 import numpy as np
 
-from . import model
+from . import model, validity
 from .arrays import Array
+from .constants import walls
+from .line import Water, water_at
 from .maths.so3 import matrix
+from .notes import SIZE, texts
 from .parameters import PipeParameters
 from .results import section_forces, wall_stress
 from .results.section_forces import SectionForces
 from .statics.solve import Equilibrium, solve
 from .step import integrator
 from .step.integrator import STIFF, PipeState, StepResult
+from .vectors import Unit, unpacked
 
 
 class Pipe:
@@ -21,11 +25,16 @@ class Pipe:
 
     def __init__(self, parameters: PipeParameters) -> None:
         self.parameters = model.resolve(parameters)
-        self.s, self.line = model.discretize(self.parameters)
-        self.water = model.waters(self.parameters)
-        self.mass = model.mass_per_length(self.parameters, self.s)
-        self.walls = wall_stress.walls(parameters, self.s)
-        self.element_walls = wall_stress.element_walls(parameters, self.s)
+        self.constants = model.constants(self.parameters)
+        self.unit: Unit = unpacked(self.constants)
+        self.s, self.line, self.sea, self.mass = self.unit.s, self.unit.line, self.unit.sea, self.unit.mass
+        self.element_walls = self.unit.element_walls
+        self.walls = walls(self.parameters, self.s)
+
+    def water(self, time: float) -> Water:
+        """The water at `time` [s]."""
+        water: Water = water_at(self.sea, time)
+        return water
 
     def equilibrium(self, top: tuple[float, float, float], attitude: Array | None, time: float = 0.0) -> Equilibrium:
         """Static equilibrium with the top at `top` (3,) [m], e, its section at `attitude` (4,), or as it hangs if None."""
@@ -41,11 +50,15 @@ class Pipe:
         """State of rest of the unstretched line along x: no equilibrium, but of the layout of all states."""
         position, quaternion = np.zeros((len(self.s), 3)), np.zeros((len(self.s), 4))
         position[:, 0], quaternion[:, 0] = self.s, 1.0
-        return integrator.rest(self.line, position, quaternion, 0.0)
+        return self._resting(position, quaternion, 0.0)
 
     def at_rest(self, found: Equilibrium, time: float = 0.0) -> PipeState:
         """State of rest in an equilibrium."""
-        return integrator.rest(self.line, found.position, found.quaternion, time)
+        return self._resting(found.position, found.quaternion, time)
+
+    def _resting(self, position: Array, quaternion: Array, time: float) -> PipeState:
+        state: PipeState = integrator.rest(self.line, position, quaternion, float(time))
+        return state
 
     def step(self, state: PipeState, velocity: Array, spin: Array, h: float, mobility: Array = STIFF) -> StepResult:
         """Step of h [s] with the top's mean velocity and angular velocity (3,), e, or those without the pipe of a top that yields to
@@ -55,7 +68,8 @@ class Pipe:
 
     def energies(self, state: PipeState) -> tuple[float, ...]:
         """Energies [J], in the order of state.ENERGIES."""
-        return integrator.energy_of(self.line, state)
+        energies: tuple[float, ...] = integrator.energy_of(self.line, state)
+        return energies
 
     def section_forces(self, state: PipeState) -> SectionForces:
         """Section forces at the nodes, material components, without those of numerical damping."""
@@ -90,4 +104,11 @@ class Pipe:
 
     def stretched_length(self, state: PipeState) -> float:
         """Length of the centreline [m], the paper's s_h of Fig. 4."""
-        return section_forces.centreline_length(self.line.length, state.strain)
+        return float(section_forces.centreline_length(self.line.length, state.strain))
+
+    def remarks(self, state: PipeState, utilisation: float) -> list[str]:
+        """One line on each kind that is beyond its limit in a state."""
+        notes = np.zeros(SIZE)
+        stiffness, quiet = self.line.stiffness, validity.QUIET.copy()
+        validity.look(self.s, stiffness, self.unit.limits, state.position, state.strain, utilisation, quiet, 0, notes)
+        return texts(notes, validity.WORDS)

@@ -1,21 +1,23 @@
 """The pipe as a co-simulation unit: names, units and meaning of its ports. Knows nothing of FMI; an adapter does the rest."""
 
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
-from . import loads, substeps, validity
+from . import loads, native, validity
 from .arrays import Array
 from .model import resolve
+from .notes import SIZE, texts
 from .parameters import PipeParameters
 from .pipe import Pipe
-from .step.state import ENERGIES, LEDGER, WORK_PORTS
+from .step.state import ENERGIES, LEDGER, PipeState
+from .validity import QUIET
+from .vectors import Now, loaded, state_size, store
 
 Port = tuple[int, str | tuple[str, ...], str]
 
 _MOTION = "of the hang-off point, mean over the coming step, in e"
-UNSTABLE = "statics: the equilibrium is not stable; the line will leave it at the least push"
+UNSTABLE = native.UNSTABLE
 _PULL = "of the pipe on the vessel at the hang-off point, in e"
 _MOBILITY = 3 * (3 * ("m/(N.s)",) + 3 * ("1/(N.s)",)) + 3 * (3 * ("rad/(N.s)",) + 3 * ("rad/(N.m.s)",))
 _IMPEDANCE = 3 * (3 * ("N.s/m",) + 3 * ("N.s/rad",)) + 3 * (3 * ("N.s",) + 3 * ("N.m.s/rad",))
@@ -47,12 +49,36 @@ class PipeUnit:
 
     def __init__(self, parameters: PipeParameters) -> None:
         self._pipe = Pipe(parameters)
-        self.state: Any = (self._pipe.straight(), np.zeros(6), np.zeros((6, 6)), 0, 0.0, validity.QUIET)  # the layout; see `initialize`
+        self._unit, self.constants = self._pipe.unit, self._pipe.constants
+        self._places = native.output_places(self._pipe.parameters)
+        self._values_of: Any = None  # the state that the outputs are of
+        self._values, self._known = np.empty(0), set[int]()
         self.remark = ""  # what the host's log should say of the start, or of the last step that was done; a line each
-        self._most, self._limits, self._yields = parameters.max_substeps, validity.limits(self._pipe), _has_yield_stress(parameters)
-        self._reference = np.array([*parameters.reference_force, *parameters.reference_moment])
-        self._memo: dict[str, Array] = {}
-        self._memo_of: Any = None
+        self.state = self._stored(self._pipe.straight(), np.zeros(6), np.zeros((6, 6)), 0.0, QUIET)  # never changed, but replaced
+
+    @property
+    def parameters(self) -> PipeParameters:
+        """The parameters, with the nodes placed."""
+        return self._pipe.parameters
+
+    def compile(self) -> None:
+        """Run every kernel once."""
+        notes, numbers = np.zeros(SIZE), native.values(self.parameters)
+        native.unit_constants(self.constants, numbers, np.empty_like(self.constants), notes)
+        native.unit_start(self.constants, self.constants, self.state, np.zeros(native.N_INPUTS), 0.0, np.empty_like(self.state), notes)
+        self._stepped(0.0, 1e-3, np.zeros(native.N_INPUTS), notes)
+        native.unit_outputs(self.constants, self.state, 0, np.empty(max(part.stop for part, _ in self._places.values())))
+
+    def _stored(self, state: PipeState, top: Array, impedance: Array, residual: float, told: Array) -> Array:
+        out = np.empty(state_size(len(self._pipe.s), self._pipe.parameters.added_mass is not None))
+        store(state, top, impedance, 0, residual, told, out)
+        return out
+
+    @property
+    def now(self) -> Now:
+        """The state, unpacked."""
+        now: Now = loaded(self.state, len(self._pipe.s), self._pipe.parameters.added_mass is not None)
+        return now
 
     @staticmethod
     def outputs(parameters: PipeParameters) -> dict[str, Port]:
@@ -108,109 +134,38 @@ class PipeUnit:
         found, state = self._pipe.start(time)
         if not found.converged:
             return f"statics: no equilibrium: {found.unbalance(self._pipe.s)}"
-        still = np.zeros(3)
-        self._pipe.step(state, still, still, 1e-3)  # so that compiling its kernel belongs to the start, not to the first step
-        self.state = (state, found.top, found.stiffness, 0, found.residual, validity.QUIET)
+        notes, told = np.zeros(SIZE), QUIET.copy()
+        native.look(self._unit, state, told, notes)
+        self.state = self._stored(state, found.top, found.stiffness, found.residual, told)
+        self._stepped(time, 1e-3, np.zeros(native.N_INPUTS), np.zeros(SIZE))  # compiling it belongs to the start
         remarks = [] if found.stable else [UNSTABLE]
-        self.remark = "\n".join([*remarks, *validity.of_parameters(self._pipe.parameters), *self._look()])
+        self.remark = "\n".join([*remarks, *validity.of_parameters(self._pipe.parameters), *texts(notes, native.MESSAGES)])
         return None
-
-    def _look(self) -> list[str]:
-        """Remarks on the present state, if it is beyond a limit by more than was said; remembers in the state what it says."""
-        *rest, told = self.state
-        utilisation = float(self.output("largest_utilisation")[0]) if self._yields else 0.0
-        words, told = validity.look(self._pipe, self._limits, rest[0], utilisation, told)
-        if words:
-            known, self.state = self._memo_of is self.state, (*rest, told)
-            self._memo_of = self.state if known else None  # what was computed of the state still holds
-        return words
 
     def step(self, time: float, h: float, inputs: dict[str, Array]) -> str | None:
-        """Advance by h [s]; a message, and the state unchanged, if Newton's method does not converge, nor in sub-steps if allowed.
-
-        A top that yields gets no sub-steps: each part would have a velocity of its own, and the work would not be that of the means.
-        """
-        start, mobility = self.state[0], inputs["mobility"].reshape(6, 6)
-        if start.time != time:
-            start = start._replace(time=time)
-        most = 1 if mobility.any() else self._most
-        step = partial(self._pipe.step, mobility=mobility)
-        result, parts = substeps.divide(step, start, inputs["velocity"], inputs["angular_velocity"], h, most)
-        what = f"step of {h:g} s at t = {time:g} s"
-        if not result.converged:
-            nor = f", nor in sub-steps of {h / most:g} s" if most > 1 else ""
-            if result.flaw:
-                return f"{what}{nor}: an element would be {result.flaw}; more nodes may help"
-            corrections = f"no convergence after {result.iterations} corrections"
-            return f"{what}: {corrections}{nor}, residual {result.residual:.2e} of the largest element force"
-        self.state = (result.state, result.top, result.impedance, result.iterations, result.residual, self.state[-1])
-        remarks = self._look()
-        if len(parts) > 1:
-            remarks.append(
-                f"{what}: done in {len(parts)} sub-steps of {min(parts):g} s or more, {result.iterations} corrections; pose and "
-                "work of the top are exact, but its velocity jumps at both ends of the step instead of being smooth"
-            )
-        self.remark = "\n".join(remarks)
+        """Advance by h [s]; a message, and the state unchanged, if Newton's method does not converge, nor in sub-steps if allowed."""
+        notes = np.zeros(SIZE)
+        status, after = self._stepped(time, h, np.concatenate([inputs[name] for name in self.INPUTS]), notes)
+        words = "\n".join(texts(notes, native.MESSAGES))
+        if status:
+            return words
+        self.state, self.remark = after, words
         return None
+
+    def _stepped(self, time: float, h: float, inputs: Array, notes: Array) -> tuple[int, Array]:
+        after = np.empty_like(self.state)
+        return native.unit_step(self.constants, inputs, time, h, self.state, after, notes), after
 
     def output(self, name: str) -> Array:
         """Values (size,) of a port, computed when first asked for in a state."""
-        if self._memo_of is not self.state:
-            self._memo_of, self._memo = self.state, {}
-        if name not in self._memo:
-            self._compute(name)
-        return self._memo[name]
-
-    def _compute(self, name: str) -> None:
-        state, top, impedance, iterations, residual, _ = self.state
-        memo = self._memo
-        if name in ("force", "moment"):
-            memo["force"], memo["moment"] = -top[:3], -top[3:]  # eq. (69)
-        elif name in ("force_change", "moment_change"):
-            memo["force_change"], memo["moment_change"] = -top[:3] - self._reference[:3], -top[3:] - self._reference[3:]
-        elif name in ("top_velocity", "top_angular_velocity"):
-            memo["top_velocity"], memo["top_angular_velocity"] = state.last[-1, :3], state.last[-1, 3:]
-        elif name == "top_position":
-            memo[name] = state.position[-1]
-        elif name == "top_quaternion":
-            memo[name] = state.quaternion[-1]
-        elif name == "impedance":
-            memo[name] = np.ravel(impedance)
-        elif name.endswith("_energy"):
-            memo |= {port: np.array([value]) for port, value in zip(ENERGIES, self._pipe.energies(state), strict=True)}
-        elif name == "top_work":
-            memo[name] = np.array([state.top_work])
-        elif name in WORK_PORTS:
-            memo |= {port: state.works[i : i + 1] for i, port in enumerate(WORK_PORTS)}
-        elif name == "pipe_length":
-            memo[name] = np.array([self._pipe.stretched_length(state)])
-        elif name == "newton_iterations":
-            memo[name] = np.array([float(iterations)])
-        elif name == "newton_residual":
-            memo[name] = np.array([residual])
-        elif name == "s":
-            memo[name] = self._pipe.s
-        elif name == "node_position":
-            memo[name] = state.position.ravel()
-        else:
-            self._recover(state)
-
-    def _recover(self, state: Any) -> None:
-        forces = self._pipe.section_forces(state)
-        end = self._pipe.spatial(state, forces, -1)
-        self._memo |= {
-            "node_tension": forces.tension,
-            "node_wall_tension": self._pipe.wall_tension(state, forces),
-            "node_moment": forces.moment.ravel(),
-            "node_shear": forces.shear.ravel(),
-            "largest_tension": np.array([forces.tension.max()]),
-            "largest_bending_moment": np.array([self._pipe.largest_bending_moment(forces)]),
-            "largest_von_mises": np.array([self._pipe.largest_von_mises(state, forces)]),
-            "end_force": -end[:3],
-            "end_moment": -end[3:],
-        }
-        if self._yields:
-            self._memo["largest_utilisation"] = np.array([self._pipe.utilisation(state, forces)])
+        place, group = self._places[name]
+        if self._values_of is not self.state:
+            size = max(part.stop for part, _ in self._places.values())
+            self._values_of, self._values, self._known = self.state, np.empty(size), set()
+        if group not in self._known:
+            native.unit_outputs(self.constants, self.state, group, self._values)
+            self._known.add(group)
+        return self._values[place]
 
 
 def _has_yield_stress(parameters: PipeParameters) -> bool:

@@ -10,45 +10,48 @@ the one step takes the held velocity for the mean of a smooth motion, the parts 
 which the line below the top answers with waves of its own.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
-from .arrays import Array
-from .step.integrator import PipeState, StepResult
+from .compiled import inlined
+from .line import water_at
+from .step.integrator import search
+from .step.state import timed
 
 DIVISOR = 3
+_MOST_WAITING = 64  # parts that wait to be done: two for each time that the step is divided, and one
 
-Step = Callable[[PipeState, Array, Array, float], StepResult]
 
+@inlined
+def divide(line, sea, state, velocity, spin, h, mobility, most, longest):
+    """A step of h [s], whole if it converges, else in as few parts as do, none shorter than h / `most`, a power of three.
 
-def divide(step: Step, state: PipeState, velocity: Array, spin: Array, h: float, most: int) -> tuple[StepResult, tuple[float, ...]]:
-    """A step of h [s], whole if it converges, else in as few parts as do, none shorter than h / `most`, a power of three; the parts [s].
-
-    The result of a divided step has the mean top force, the impedance of the last part, all corrections and the largest residual. Where a
-    part of h / `most` does not converge, the result is that part's, and its state the old one.
+    No part longer than `longest` [s] is tried, unless it is the last resort. Returns the fields of a StepResult, then the number of parts
+    and the shortest [s]. A divided step has the mean top force, the impedance of the last part, all corrections and the largest residual.
+    Where a part of h / `most` does not converge, the result is that part's, and its state the old one.
     """
-    result = step(state, velocity, spin, h)
-    if result.converged or most == 1:
-        return result, (h,)
-    spent, now = result.iterations, state
-    todo, lengths, results = [h / DIVISOR] * DIVISOR, [], []
-    while todo:
-        length = todo.pop()
-        result = step(now, velocity, spin, length)
-        spent += result.iterations
-        if result.converged:
-            now = result.state
-            lengths.append(length)
-            results.append(result)
-        elif length * most > 1.5 * h:
-            todo += [length / DIVISOR] * DIVISOR
-        else:
-            return result._replace(state=state, iterations=spent), (*lengths, length)
-    whole = result._replace(
-        state=now._replace(time=state.time + h),
-        top=np.average([one.top for one in results], axis=0, weights=lengths),
-        iterations=spent,
-        residual=max(one.residual for one in results),
-    )
-    return whole, tuple(lengths)
+    waiting, left = np.empty(_MOST_WAITING), 1
+    waiting[0] = h
+    now, total, spent, parts, shortest, worst = state, np.zeros(6), 0, 0, h, 0.0
+    done, top, impedance, residual, flaw = False, np.zeros(6), np.zeros((6, 6)), 0.0, 0
+    while left > 0:
+        left -= 1
+        length = waiting[left]
+        divisible = length * most > 1.5 * h
+        done = False
+        if length <= longest or not divisible:
+            water = water_at(sea, now.time + 0.5 * length)
+            done, new, top, impedance, iterations, residual, flaw = search(line, water, now, velocity, spin, length, mobility)
+            spent += iterations
+            if done:
+                now, parts, shortest, worst = new, parts + 1, min(shortest, length), max(worst, residual)
+                for i in range(6):
+                    total[i] += length * top[i]
+        if not done:
+            if not divisible:
+                return False, state, top, impedance, spent, residual, flaw, parts, length
+            for _ in range(DIVISOR):
+                waiting[left] = length / DIVISOR
+                left += 1
+    if parts > 1:
+        now, top = timed(now, state.time + h), total / h
+    return True, now, top, impedance, spent, worst, 0, parts, shortest

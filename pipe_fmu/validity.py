@@ -7,22 +7,31 @@
   the highest grade, X120, yields at 0.4 %), or any other section by more than the 5 % of the law of small strains.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from .arrays import Array
 from .checks import unusual
-from .compiled import kernel
-from .parameters import MOST_STRETCH, PipeParameters, Section
-from .pipe import Pipe
-from .step.state import PipeState
+from .compiled import inner, kernel
+from .notes import WARNING, note
+from .parameters import PipeParameters
+from .rules import MOST_STRETCH
 
 QUIET = np.zeros(5)  # nothing said yet: below, above, compression, strain, yield
 STEEL_STRAIN, STEEL_MODULUS = 0.005, 150e9  # strain a steel wall may have without `yield_stress`; Pa, below which a wall is not of steel
 SURFACE, SLACK = 0.01, 1e-3  # of the depth, of the largest tension
 NO_STRAIN = 1e-7  # of EA: no more tension than this is none
 WORSE = 1.5  # times what was said last is said again
+WORDS = (
+    "the line hangs %.2g m below the sea floor at S = %.4g m, as there is no bed",
+    "the line rises %.2g m above the surface at S = %.4g m, where it keeps weight and drag of the water",
+    "the line is in compression at S = %.4g m: effective tension %.3g kN",
+    "the line is strained by %.2g %% at S = %.4g m, beyond what any pipe steel bears elastically",
+    "the line is strained by %.2g %% at S = %.4g m, beyond the law of small strains",
+    "past yield: the largest stress is %.3g of the yield stress",
+)
 HEAVIEST, DENSITIES = 5e4, (50.0, 2e4)  # N/m, kg/m3: submerged weights and mean densities beyond are those of no line
 
 
@@ -37,50 +46,41 @@ class Limits(NamedTuple):
     bearable: Array  # (n - 1,) strain, infinite where a section has a yield stress
 
 
-def limits(pipe: Pipe) -> Limits:
-    """Limits of a line."""
-    parameters = pipe.parameters
-    sections = parameters.all_sections
-    ends = np.cumsum([section.length or parameters.length for section in sections])
-    which = np.minimum(np.searchsorted(ends, 0.5 * (pipe.s[1:] + pipe.s[:-1])), len(sections) - 1)
-    return Limits(
-        np.inf if parameters.seabed is not None else 0.5 * max(section.hydrodynamic_diameter for section in sections),
-        -parameters.environment.depth,
-        SURFACE * parameters.environment.depth,
-        NO_STRAIN * float(pipe.line.stiffness[:, 0].max()),
-        np.array([0.0 if section.wall_thickness is None else section.radii[1] for section in sections])[which],
-        np.array([_bearable(section) for section in sections])[which],
-    )
+@inner
+def bearable(thickness, modulus, yield_stress):
+    """Strain that a section bears: infinite where its yield stress says more; numbers that are not given are NaN."""
+    if not math.isnan(yield_stress):
+        return math.inf
+    return STEEL_STRAIN if modulus >= STEEL_MODULUS and not math.isnan(thickness) else MOST_STRETCH
 
 
-def _bearable(section: Section) -> float:
-    if section.yield_stress is not None:
-        return np.inf
-    return MOST_STRETCH if section.wall_thickness is None or section.youngs_modulus < STEEL_MODULUS else STEEL_STRAIN
+@kernel
+def look(s, stiffness, bounds, position, strain, utilisation, told, first, notes):
+    """Note each kind that is beyond its limit and half as bad again as `told` (5,), and remember it there.
 
-
-def look(pipe: Pipe, bounds: Limits, state: PipeState, utilisation: float, told: Array) -> tuple[list[str], Array]:
-    """One line on each kind that is beyond its limit and half as bad again as `told` (5,), and `told` with them.
-
-    `utilisation` is that of the yield stress in this state, 0 where there is none.
+    s (n,): arc lengths of the nodes; stiffness (n - 1, 6); `utilisation` is that of the yield stress, 0 where there is none; `first`:
+    number of the template of the first kind.
     """
-    beyond, value, place = np.empty((3, 5))
+    beyond, value, place = np.empty(5), np.empty(5), np.zeros(5)
     beyond[4] = value[4] = utilisation
-    if not _measure(state.position, state.strain, pipe.line.stiffness, bounds, told, beyond, value, place):
-        return [], told
-    new = beyond > np.maximum(1.0, WORSE * told)
-    (deepest, above, least, strained, _), place = value.tolist(), place[:4].astype(int)
-    s, middle = pipe.s[place], 0.5 * (pipe.s[place] + pipe.s[np.minimum(place + 1, len(pipe.s) - 1)])
-    bearable = float(bounds.bearable[place[3]])
-    over = "what any pipe steel bears elastically" if bearable == STEEL_STRAIN else "the law of small strains"
-    words = (
-        f"the line hangs {deepest:.2g} m below the sea floor at S = {s[0]:.4g} m, as there is no bed",
-        f"the line rises {above:.2g} m above the surface at S = {s[1]:.4g} m, where it keeps weight and drag of the water",
-        f"the line is in compression at S = {middle[2]:.4g} m: effective tension {least / 1e3:.3g} kN",
-        f"the line is strained by {100.0 * strained * bearable:.2g} % at S = {middle[3]:.4g} m, beyond {over}",
-        f"past yield: the largest stress is {utilisation:.3g} of the yield stress",
-    )
-    return [text for text, is_new in zip(words, new, strict=True) if is_new], np.where(new, beyond, told)
+    if not _measure(position, strain, stiffness, bounds, told, beyond, value, place):
+        return
+    worst = int(place[3])
+    bearable = bounds.bearable[worst]
+    for k in range(5):
+        if not beyond[k] > max(1.0, WORSE * told[k]):
+            continue
+        told[k] = beyond[k]
+        at = int(place[k])
+        where = s[at] if k < 2 else 0.5 * (s[at] + s[min(at + 1, s.shape[0] - 1)])
+        if k < 2:
+            note(notes, WARNING, first + k, (value[k], where))
+        elif k == 2:
+            note(notes, WARNING, first + 2, (where, value[2] / 1e3))
+        elif k == 3:
+            note(notes, WARNING, first + (3 if bearable == STEEL_STRAIN else 4), (100.0 * value[3] * bearable, where))
+        else:
+            note(notes, WARNING, first + 5, (value[4],))
 
 
 def of_parameters(parameters: PipeParameters) -> list[str]:

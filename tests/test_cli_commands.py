@@ -19,7 +19,7 @@ from master.coupling.ledger import EnergyCheckFailed
 from master.fmu.instance import FmuFailed, StepRejected
 from master.run import prepared
 from master.run import simulate as run
-from master.run.drive import Effort, pose_gap, top_tension
+from master.run.drive import Cost, pose_gap, top_tension
 from master.run.warnings import Remarks
 from master.scene import keys
 from master.scene.reading import FOUND, from_mapping, load
@@ -51,7 +51,7 @@ class StillDrive:
 
     def __init__(self, fate="nothing"):
         s = np.linspace(0.0, 1200.0, 5)
-        self.time, self.fate, self.effort = 0.0, fate, Effort()
+        self.time, self.fate, self.cost = 0.0, fate, Cost()
         pipe = Ports(
             force=(1, 2, 3),
             moment=(0, 0, 0),
@@ -78,7 +78,7 @@ class StillDrive:
         if self.time >= 1.0 and self.fate == "leak":
             raise EnergyCheckFailed("energy check failed at 1.1 s: closure error 1 J")
         self.time = min(round(self.time + 0.1, 9), end)
-        self.effort = Effort(macro_steps=round(self.time / 0.1))
+        self.cost = Cost(macro_steps=round(self.time / 0.1))
 
     def derived(self):
         return {("pose_gap", "m"): 1e-15, ("pose_gap_angle", "rad"): 0.0, ("top_tension", "N"): 9e5}

@@ -102,7 +102,7 @@ def test_a_prescribed_top_goes_exactly_where_it_should():
         motion = loaded.sections.top_motion
         np.testing.assert_allclose(position, np.add(motion.displacement(4.0), (800.0, 0.0, -800.0)), atol=1e-11)
         assert moving.ledger.largest_closure <= 1e-8 * moving.ledger.exchanged
-        assert moving.effort.pipe_solves == moving.effort.macro_steps == 40
+        assert moving.cost.pipe_solves == moving.cost.macro_steps == 40
 
 
 def test_a_prescribed_top_is_watched_too():

@@ -6,7 +6,7 @@ from units.toys import build_pair, tied
 
 from master.coupling.bond import Bond, Pair
 from master.coupling.one_sided import OneSided
-from master.coupling.predicted_end import Foreseen
+from master.coupling.predicted_end import PredictedEnd
 from master.coupling.scheme import CouplingFailed
 from master.fmi.build import cache_folder
 from master.run.drive import open_drive, pose_gap
@@ -93,7 +93,7 @@ class Body:
     ids=["a mass", "one that gives energy", "one without reciprocity"],
 )
 def test_the_measured_slope_is_symmetric_and_not_negative_whatever_the_end_does(inverse, passive):
-    foreseen, random = Foreseen(Body(np.array(inverse)), Bond((Pair("f", "v", 1e-6, 2),))), np.random.default_rng(1)
+    foreseen, random = PredictedEnd(Body(np.array(inverse)), Bond((Pair("f", "v", 1e-6, 2),))), np.random.default_rng(1)
     for i in range(60):
         held, step = random.normal(size=2), 0.1
         foreseen.take(i * step, step, held)
@@ -107,7 +107,7 @@ def test_what_the_other_end_did_not_follow_it_is_told_to_make_up_for(rollback):
     expected = []
     for end, missed in zip(ends, (0.0, 0.25), strict=True):
         end.rollback = rollback
-        foreseen, held = Foreseen(end, Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
+        foreseen, held = PredictedEnd(end, Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
         foreseen.take(0.0, 0.1, held)
         foreseen.owe(np.full(2, 0.1 * missed), np.zeros(2))  # the end moved `missed` further than it was followed, for 0.1 s
         expected.append(foreseen.solve(0.1, 0.2, held))
@@ -115,7 +115,7 @@ def test_what_the_other_end_did_not_follow_it_is_told_to_make_up_for(rollback):
 
 
 def test_what_the_other_end_pulled_beyond_what_was_held_is_held_in_the_next_step():
-    foreseen, held = Foreseen(Body(np.eye(2)), Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
+    foreseen, held = PredictedEnd(Body(np.eye(2)), Bond((Pair("f", "v", 1e-6, 2),))), np.array([0.3, -0.2])
     foreseen.owe(np.zeros(2), np.array([0.05, 0.02]))  # N s
     given, flow, wanted = foreseen.take(0.0, 0.1, held)
     np.testing.assert_allclose(given, held + np.array([0.5, 0.2]), atol=1e-15)
@@ -162,6 +162,6 @@ def test_the_papers_scene_keeps_its_energy_with_one_solve_of_a_pipe_that_cannot_
     with open_drive(scene.sections, prepare(scene)) as drive:
         while drive.time < 8.0:
             drive.advance(8.0)  # the energy check would stop it
-        assert drive.effort.pipe_solves == drive.effort.macro_steps
+        assert drive.cost.pipe_solves == drive.cost.macro_steps
         assert drive.ledger.exchanged > 1.0
         assert pose_gap(drive.units["pipe"], drive.units["vessel"])["pose_gap", "m"] <= 1e-9

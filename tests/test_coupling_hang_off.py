@@ -51,7 +51,7 @@ def final(step, duration=2.0, changes=()):
         start = pipe.get("node_position"), vessel.get("position")
         while drive.time < duration:
             drive.advance(duration)
-        assert drive.effort.rejected_steps == 0
+        assert drive.cost.rejected_steps == 0
         found = {name: pipe.get(name) for name in ("node_position", "node_tension", "end_moment", "force", "moment")}
         found |= {name: vessel.get(name) for name in ("position", "velocity", "angular_velocity")}
         return found | {"node_displacement": found["node_position"] - start[0], "displacement": found["position"] - start[1]}

@@ -10,7 +10,7 @@ from master.coupling.bond import Bond, Pair, impedance_end, mobility_end
 from master.coupling.choose import coupling
 from master.coupling.energy_consistent import EnergyConsistent
 from master.coupling.hang_off import hang_off
-from master.coupling.linearly_implicit import History, OneSolve
+from master.coupling.linearly_implicit import History, LinearlyImplicit
 from master.coupling.predictor import Extrapolation
 from master.coupling.scheme import CouplingFailed, Step
 from master.fmu.instance import STEP_FAILURES
@@ -412,7 +412,7 @@ class Linear(Still):
 
 
 def test_what_one_solve_of_each_end_leaves_is_what_is_held_less_what_is_answered_times_the_flow():
-    scheme = OneSolve(Linear(-2.0, [3.0, 1.0]), Linear(0.5, [0.2, 0.0]), Bond((Pair("effort", "flow", 1e-6, 2),)), 0.1)
+    scheme = LinearlyImplicit(Linear(-2.0, [3.0, 1.0]), Linear(0.5, [0.2, 0.0]), Bond((Pair("effort", "flow", 1e-6, 2),)), 0.1)
     done = scheme.advance(0.0, 0.1)
     held, flow = np.array([3.0, 1.0]), np.array([1.7, 0.5])
     np.testing.assert_allclose(done.flow, flow)

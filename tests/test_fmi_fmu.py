@@ -7,7 +7,6 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from dataclasses import replace
 from pathlib import Path
 from typing import get_args, get_type_hints
 from xml.etree import ElementTree
@@ -19,7 +18,6 @@ from fmpy.validation import validate_fmu
 from units.spring_fmu.parameters import Failure
 from units.toys import BODY, SPRING, build_pair, spring_recipe
 
-from master.errors import RunError
 from master.fmi import licenses
 from master.fmi.build import Recipe, build_fmu, bundled_package, cache_folder, cached_fmu
 from master.fmi.description import base_unit
@@ -449,11 +447,6 @@ def test_an_unwritable_cache_is_no_obstacle_and_builder_and_fmu_go_to_the_same_p
     assert cache_folder("units") == place / "units"
     assert cache_folder("fmus") == tmp_path / "cache" / "fmus"
 
-
-def test_a_portable_fmu_without_compiled_kernels_is_not_made(folder):
-    with pytest.raises(RunError, match="--portable: Body left no compiled kernels"):
-        build_fmu(replace(BODY, portable=True), folder / "portable.fmu")
-    assert not (folder / "portable.fmu").exists()
 
 
 def test_licence_files_are_taken_and_modules_of_such_a_name_are_not(tmp_path, monkeypatch):

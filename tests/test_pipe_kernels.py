@@ -8,12 +8,12 @@ from pipe_helpers import P16, assembled, bar, loaded, rotation, started, straigh
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
-from pipe_fmu import PipeParameters
+from pipe_fmu import PipeParameters, constants
 from pipe_fmu.element import ends
 from pipe_fmu.environment import Environment
 from pipe_fmu.line import Water
 from pipe_fmu.maths import block_tridiagonal
-from pipe_fmu.results import section_forces, wall_stress
+from pipe_fmu.results import section_forces
 from pipe_fmu.statics import stability
 from pipe_fmu.step import newton
 from pipe_fmu.step import system as step_kernel
@@ -111,7 +111,7 @@ def test_above_the_surface_there_is_no_pressure():
 def test_a_node_has_the_walls_of_the_sections_below_and_above_it():
     sections = (replace(P16, length=500.0), replace(P16, length=700.0, wall_thickness=0.0254))
     parameters = PipeParameters(sections=sections)
-    below, above = wall_stress.walls(parameters, np.array([0.0, 250.0, 500.0, 501.0, 1200.0]))
+    below, above = constants.walls(parameters, np.array([0.0, 250.0, 500.0, 501.0, 1200.0]))
     thin, thick = (section.steel_area for section in sections)
     np.testing.assert_allclose(below.area, [thin, thin, thin, thick, thick], rtol=1e-12)
     np.testing.assert_allclose(above.area, [thin, thin, thick, thick, thick], rtol=1e-12)

@@ -307,5 +307,3 @@ def test_current_profiles_over_the_depth():
     assert Current(profile="uniform").shape(800.0) == ((0.0, 800.0), (1.0, 1.0))
     table = Current(profile="table", depths=(0.0, 50.0), factors=(1.0, 0.3), velocity=(1.0, 0.0, 0.0))
     assert table.shape(800.0) == ((0.0, 50.0), (1.0, 0.3))
-    assert table.surface_velocity(0.0, 800.0) == (1.0, 0.0, 0.0)
-    assert math.isclose(Current(velocity=(0.0, 0.8, 0.0), start=10.0).surface_velocity(11.0, 800.0)[1], 0.8)

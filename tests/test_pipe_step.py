@@ -26,7 +26,7 @@ from pipe_helpers import (
     straight,
 )
 
-from pipe_fmu import AddedMass, PipeParameters, PipeUnit, Seabed, model
+from pipe_fmu import AddedMass, PipeParameters, PipeUnit, Seabed
 from pipe_fmu.step import integrator
 from pipe_fmu.step import system as step_kernel
 from pipe_fmu.step.integrator import WORKS
@@ -260,7 +260,7 @@ def test_tangent_of_the_step_is_the_derivative_of_its_residual(name):
     h, n = 0.1, 6
     old = state.position, state.quaternion, 0.05 * random.normal(size=(n, 3)), 1e-3 * random.normal(size=(n, 3))
     x = np.hstack([h * old[2], 1e-4 * random.normal(size=(n, 3))])
-    water = model.water(pipe.parameters, 0.0)
+    water = pipe.water(0.0)
     tangent = step_system(pipe.line, old, x, h, water)[1]
     got = np.empty_like(tangent)
     for k in range(6 * n):
@@ -395,7 +395,7 @@ def test_residual_is_the_same_with_and_without_its_tangent(name, size):
     pipe, _, state = started(scene(name, nodes=10))
     random = np.random.default_rng(2)
     x = size * random.normal(size=(10, 6))
-    water = model.water(pipe.parameters, 0.0)
+    water = pipe.water(0.0)
     both = []
     for fresh in (True, False):
         system = np.empty((10, 6, 6)), np.empty((9, 6, 6)), np.empty((9, 6, 6)), np.empty((10, 6))

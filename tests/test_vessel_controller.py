@@ -7,9 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
-from vessel_fmu.dp_controller import control_law, due_sample, filtered, initial_control, pid, sampled, with_pull, wrap
+from vessel_fmu.attitude import along_heading, angles_from_quaternion
+from vessel_fmu.dp_controller import control_law, controlled, due_sample, filtered, initial_control, pid, sampled, with_pull, wrap
 from vessel_fmu.environment import Current, Environment
-from vessel_fmu.parameters import Controller, Start, VesselParameters, mass_matrix
+from vessel_fmu.parameters import Controller, Start, VesselParameters, values
 from vessel_fmu.vessel import Inputs, Vessel
 
 HOLD = 379.6e3  # N, horizontal pull of the 16 in pipe hanging tangentially to the bed; 316.7e3 N at x = 780 m
@@ -111,7 +112,7 @@ def test_feed_forward_acts_on_accepted_steps_only_and_not_within_the_step():
 
 
 def test_low_pass_of_the_pull_does_not_depend_on_the_step():
-    law, hold = control_law(PAPER), np.array([HOLD, 0.0, 0.0])
+    law, hold = control_law(values(PAPER)), np.array([HOLD, 0.0, 0.0])
     fine = coarse = initial_control(hold, np.zeros(3))
     pull = np.array([-1e5, 2e5, 3e6])
     for _ in range(100):
@@ -133,7 +134,7 @@ def test_reference_filter_is_the_exact_third_order_lag(dt):
 
 def test_thrust_is_saturated_along_the_heading():
     parameters = replace(PAPER, hold_force=(0.0, 0.0, 0.0), start=Start(attitude=(0.0, 0.0, 0.7)))
-    law = control_law(parameters)
+    law = control_law(values(parameters))
     state = initial_control(np.zeros(3), np.array([804.72, 0.0, 0.7]))
     far = np.array([[700.0, 300.0, -1.5], [0.0] * 3, [0.0] * 3])
     _, thrust = pid(law, far, state.integral, state.pull, np.array([804.72, 0.0, 0.7]), np.zeros(3), 0.5)
@@ -149,14 +150,20 @@ def test_thrust_is_saturated_along_the_heading():
 def test_integral_does_not_wind_up_while_saturated(tracking, overshoot):
     """After 200 s of load beyond the thrust the vessel comes back at once; without back-calculation it shoots 50 m past."""
     weak = Controller(start=0.0, x=804.72, sway_limit=1e5, feed_forward_time=1e9)
-    vessel = Vessel(replace(PAPER, controller=weak, hold_force=(0.0, 0.0, 0.0), environment=Environment()))
-    if tracking is not None:
-        vessel.law = vessel.law._replace(tracking_time=tracking)
-
-    def blow(_, time):
-        return Inputs(environment_force=np.array([0.0, 1.5e5 if time < 200.0 else 0.0, 0.0]))
-
-    offset = np.array([state.position[1] for _, state in simulate(vessel, 500.0, 0.5, blow)])
+    free = replace(PAPER, controller=weak, hold_force=(0.0, 0.0, 0.0), environment=Environment())
+    law, vessel = (
+        control_law(values(free)),
+        Vessel(replace(free, controller=None)),
+    )  # the controller stands outside, its thrust comes by a port
+    law = law if tracking is None else law._replace(tracking_time=tracking)
+    state, memory, offset = vessel.start(), initial_control(np.zeros(3), np.array([804.72, 0.0, 0.0])), []
+    for k in range(1000):
+        memory = controlled(law, memory, 0.5 * k, state.position, state.quaternion, state.body_velocity)
+        thrust = along_heading(angles_from_quaternion(state.quaternion)[2], memory.thrust)
+        wind = np.array([0.0, 1.5e5 if k < 400 else 0.0, 0.0])
+        state = vessel.step(state, 0.5 * k, 0.5, Inputs(environment_force=wind, control_force=thrust)).state
+        offset.append(state.position[1])
+    offset = np.array(offset)
     assert offset.max() > 30.0
     assert -offset.min() == pytest.approx(overshoot, abs=5.0)
     assert (abs(offset[-1]) < 0.1) == (tracking is None)
@@ -197,16 +204,16 @@ def test_thrust_between_samples_is_held():
 
 def test_gains_are_those_of_the_pole_placement():
     """MSS PIDnonlinearMIMO: K_p = M w^2, K_d = 2 zeta w M; M = m + A(0) at w_n = 0.05, zeta = 1."""
-    law = control_law(replace(PAPER, controller=Controller(natural_frequency=0.05, integral_ratio=0.1)))
+    law = control_law(values(replace(PAPER, controller=Controller(natural_frequency=0.05, integral_ratio=0.1))))
     mass = np.array([6.3622e6 + 8.46e5, 6.3622e6 + 5.15e6, 2.7261e9 + 2.15e9])
     assert_allclose(law.stiffness, 0.0025 * mass, rtol=1e-3)
     assert_allclose(law.damping, 0.1 * mass, rtol=1e-3)
     assert_allclose(law.integral, 0.1 * 0.05**3 * mass, rtol=1e-3)
-    assert_allclose(law.mass, np.diag(mass_matrix(PAPER))[[0, 1, 5]])
+    assert_allclose(law.mass, np.diag(Vessel(PAPER).hull.mass)[[0, 1, 5]])
 
 
 def test_a_reference_that_accelerates_is_fed_forward_by_the_mass():
-    law, zero, acceleration = control_law(PAPER), np.zeros(3), np.array([1e-2, 2e-2, 1e-5])
+    law, zero, acceleration = control_law(values(PAPER)), np.zeros(3), np.array([1e-2, 2e-2, 1e-5])
     _, thrust = pid(law, np.array([zero, zero, acceleration]), zero, zero, zero, zero, 0.5)
     assert_allclose(thrust, law.mass * acceleration, rtol=1e-12)
 
@@ -223,17 +230,18 @@ def test_the_current_over_a_step_is_that_of_its_middle():
 
 
 def test_a_sample_is_not_due_before_the_start():
-    law, state = control_law(PAPER), initial_control(np.zeros(3), np.zeros(3))
-    assert due_sample(law, state, 29.9) is None
+    law, state = control_law(values(PAPER)), initial_control(np.zeros(3), np.zeros(3))
+    assert due_sample(law, state, 29.9) == -1
     assert due_sample(law, state, 30.0 - 1e-9) == 0
-    after = sampled(law, state, 0, 30.0, np.zeros(3), np.zeros(3))
-    assert due_sample(law, after, 30.4) is None
+    after = sampled(law, state, 0.0, 30.0, np.zeros(3), np.zeros(3))
+    assert due_sample(law, after, 30.4) == -1
     assert due_sample(law, after, 31.7) == 3
 
 
 def test_the_loop_without_a_frequency_of_its_own_is_that_of_a_tenth_of_a_radian_per_second():
     """K_p = M w_n^2, K_d = 2 M w_n, K_i = 0.2 w_n K_p at w_n = 0.1 rad/s."""
-    law, mass = control_law(VesselParameters(controller=Controller())), np.diag(mass_matrix(VesselParameters()))[[0, 1, 5]]
+    vessel = Vessel(VesselParameters(controller=Controller()))
+    law, mass = vessel.law, np.diag(vessel.hull.mass)[[0, 1, 5]]
     assert_allclose(law.stiffness, 0.01 * mass, rtol=1e-12)
     assert_allclose(law.damping, 0.2 * mass, rtol=1e-12)
     assert_allclose(law.integral, 2e-4 * mass, rtol=1e-12)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from vessel_fmu.attitude import exp_quaternion, rotation_matrix
 from vessel_fmu.environment import Current, Environment
-from vessel_fmu.parameters import AddedMass, Controller, LinearDamping, Start, VesselParameters, mass_matrix, symmetric_matrix
+from vessel_fmu.parameters import AddedMass, Controller, LinearDamping, Start, VesselParameters
 from vessel_fmu.vessel import Inputs, Vessel
 
 SEA = Environment(current=Current(velocity=(0.3, 0.8, 0.0)))
@@ -245,7 +245,8 @@ def test_static_heave_heel_and_trim_are_those_of_the_stiffness_of_mss_supply():
 
 def equations(parameters, loads):
     """Right-hand side of eq. (48) written afresh: pose and body velocity (18,), loads(t) force and moment in e, in b."""
-    mass, damping, drag, gravity = mass_matrix(parameters), symmetric_matrix(parameters.damping), parameters.drag, 9.81
+    hull, drag, gravity = Vessel(parameters).hull, parameters.drag, 9.81
+    mass, damping = hull.mass, hull.damping
     lift, aft = 1025.0 * gravity * parameters.waterplane_area, np.array([parameters.flotation_centre, 0.0, 0.0])
     station, share = np.polynomial.legendre.leggauss(8)
     station = drag.midship + 0.5 * drag.length * station
@@ -413,7 +414,7 @@ def test_a_controller_outside_accelerates_the_vessel_by_its_force():
     force = np.array([2e5, -1e5, 3e6])
     at_rest = vessel.start()._replace(position=np.zeros(3), quaternion=exp_quaternion(np.array([0.0, 0.0, 1.0]), 0.7))
     state = vessel.step(at_rest, 0.0, 1e-3, Inputs(control_force=force)).state
-    got = mass_matrix(vessel.parameters) @ state.body_velocity / 1e-3
+    got = vessel.hull.mass @ state.body_velocity / 1e-3
     assert_allclose(got[[0, 1, 5]], force, rtol=1e-4)
 
 

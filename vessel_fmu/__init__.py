@@ -1,7 +1,8 @@
 """Six-degree-of-freedom vessel as a co-simulation unit.
 
-`Vessel` computes, `VesselUnit` names the ports. Modules, from the facade down: slave, vessel, integrator, dp_controller,
-hydrodynamics, rigid_body, attitude, compiled; parameters, environment, checks.
+`Vessel` computes with states as values, `VesselUnit` with ports and one vector; both run the kernels of `native`. Modules, from the
+facade down: slave, vessel, native, validity, ports, integrator, dp_controller, pose, hydrodynamics, parameters, rules, rigid_body, notes,
+vectors, attitude, compiled, environment, checks.
 """
 
 from .parameters import AddedMass, Controller, HullDrag, LinearDamping, Start, VesselParameters

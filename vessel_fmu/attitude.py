@@ -48,6 +48,13 @@ def apply(a: Array, x: Array) -> Array:
 
 
 @kernel
+def fill(out: Array, x: Array) -> None:
+    """out (n,) = x."""
+    for i in range(out.shape[0]):
+        out[i] = x[i]
+
+
+@kernel
 def dot(a: Array, b: Array) -> float:
     """Scalar product."""
     total = 0.0
@@ -121,16 +128,34 @@ def mean_rotation(w: Array, h: float) -> Array:
     return a
 
 
+@kernel
 def quaternion_from_angles(roll: float, pitch: float, yaw: float) -> Array:
     """Unit quaternion of the zyx Euler angles, rad."""
-    x, y, z = np.eye(3)
-    return multiply(exp_quaternion(z, yaw), multiply(exp_quaternion(y, pitch), exp_quaternion(x, roll)))
+    axes = np.eye(3)
+    return multiply(exp_quaternion(axes[2], yaw), multiply(exp_quaternion(axes[1], pitch), exp_quaternion(axes[0], roll)))
 
 
+@kernel
 def angles_from_quaternion(q: Array) -> tuple[float, float, float]:
     """Roll, pitch, yaw (zyx), rad, of the unit quaternion q."""
-    w, x, y, z = (float(entry) for entry in q)
+    w, x, y, z = q[0], q[1], q[2], q[3]
     roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = math.atan2(2.0 * (w * y - x * z), math.hypot(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)))
     yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     return roll, pitch, yaw
+
+
+@kernel
+def heading(yaw: float) -> Array:
+    """Rotation (3, 3) of (surge, sway, yaw moment) along the heading to (x, y, yaw moment) in e."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    rotation = np.eye(3)
+    rotation[0, 0] = rotation[1, 1] = c
+    rotation[0, 1], rotation[1, 0] = -s, s
+    return rotation
+
+
+@kernel
+def along_heading(yaw: float, x: Array) -> Array:
+    """(surge, sway, yaw moment) along the heading of x (3,), (x, y, yaw moment) in e."""
+    return apply(heading(-yaw), x)

@@ -5,7 +5,8 @@ calls. So when any source of the package is newer than a cache index, all indice
 everything is compiled afresh.
 
 An `inner` kernel allocates no array, so those it is given need no counting of references, which would cost more than its arithmetic; sums
-may be rearranged in it (fused multiply-add), while NaN and infinity keep their meaning.
+may be rearranged in it (fused multiply-add), while NaN and infinity keep their meaning. An `inlined` kernel is compiled as a part of the
+one that calls it, which spares the time to compile it by itself.
 """
 
 import math
@@ -41,6 +42,8 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise ImportError("NUMBA_DISABLE_JIT is set, but the kernels can only run compiled")
 drop_stale_cache(Path(__file__).parent)
 
-kernel = njit(cache=True, error_model="numpy")
+_PLAIN: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _BARE: dict[str, Any] = {"_nrt": False, "fastmath": {"contract", "arcp", "nsz", "reassoc"}}
-inner = njit(cache=True, error_model="numpy", **_BARE)
+kernel = njit(**_PLAIN)
+inlined = njit(**_PLAIN, inline="always")
+inner = njit(**_PLAIN, **_BARE)

@@ -16,15 +16,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .attitude import Array
-from .parameters import VesselParameters, mass_matrix, set_point
+from .attitude import Array, angles_from_quaternion, apply, fill, heading, product, rotation_matrix
+from .compiled import inlined, kernel
+from .hydrodynamics import ADDED_MASS, INERTIA, MASS
+from .parameters import place
+from .rigid_body import mass_matrix
 
 GRID_TOLERANCE = 1e-6  # of a period: a step that begins this much early still takes the sample
-HORIZONTAL = [0, 1, 5]
+HORIZONTAL = np.array([0, 1, 5])
+SET_POINT = np.array([place(f"controller.{name}") for name in ("x", "y", "yaw")])
+AT_START = np.array([place(name) for name in ("start.position[1]", "start.position[2]", "start.attitude[3]")])
+LIMITS = np.array([place(f"controller.{name}_limit") for name in ("surge", "sway", "yaw")])
+START, PERIOD, FREQUENCY, DAMPING_RATIO, INTEGRAL_RATIO, FILTER_TIME, PULL_TIME = (
+    place(f"controller.{name}")
+    for name in ("start", "period", "natural_frequency", "damping_ratio", "integral_ratio", "filter_time", "feed_forward_time")
+)
+HOLD = place("hold_force")
+MEMORY = 20  # numbers of a ControlState
 
 
 class Law(NamedTuple):
-    """Constants of the controller; arrays (3,) are surge, sway, yaw."""
+    """Constants of the controller; arrays (3,) are surge, sway, yaw; NaN where there is none."""
 
     start: float  # s
     period: float  # s
@@ -42,7 +54,7 @@ class Law(NamedTuple):
 class ControlState(NamedTuple):
     """Memory of the controller; values are never mutated."""
 
-    sample: int  # number of the last sample, -1 before the first
+    sample: float  # number of the last sample, -1 before the first
     time: float  # s, of the last sample
     reference: Array  # (3, 3): eta_d and its two derivatives, each x, y, yaw
     integral: Array  # (3,) x, y in e, N; yaw, N m
@@ -50,93 +62,170 @@ class ControlState(NamedTuple):
     pull: Array  # (3,) low-passed pull of the pipe, the same
 
 
-def control_law(parameters: VesselParameters) -> Law | None:
-    """Constants of the controller, None where there is none."""
-    c = parameters.controller
-    if c is None:
-        return None
-    mass = np.diag(mass_matrix(parameters))[HORIZONTAL]
-    w = c.natural_frequency
+@inlined
+def set_point(values: Array) -> Array:
+    """Set-point (3,): x, y, m in e, and heading, rad: what the controller names, else where the vessel starts."""
+    named = np.empty(3)
+    for i in range(3):
+        named[i] = values[SET_POINT[i]]
+        if math.isnan(named[i]):
+            named[i] = values[AT_START[i]]
+    return named
+
+
+@kernel
+def control_law(values: Array) -> Law:
+    """The controller of the parameters' `values`."""
+    matrix, w = mass_matrix(values[MASS], values[INERTIA], values[ADDED_MASS]), values[FREQUENCY]
+    table = np.empty((5, 3))
+    mass, stiffness, damping, integral, limit = table[0], table[1], table[2], table[3], table[4]
+    for i in range(3):
+        mass[i] = matrix[HORIZONTAL[i], HORIZONTAL[i]]
+        stiffness[i] = mass[i] * w**2
+        damping[i] = 2.0 * values[DAMPING_RATIO] * w * mass[i]
+        integral[i] = values[INTEGRAL_RATIO] * mass[i] * w**3
+        limit[i] = values[LIMITS[i]]
     return Law(
-        start=c.start,
-        period=c.period,
-        mass=mass,
-        stiffness=mass * w**2,
-        damping=2.0 * c.damping_ratio * w * mass,
-        integral=c.integral_ratio * mass * w**3,
-        limit=np.array([c.surge_limit, c.sway_limit, c.yaw_limit]),
-        set_point=np.array(set_point(parameters)),
-        filter_time=c.filter_time,
-        pull_time=c.feed_forward_time,
-        tracking_time=1.0 / w,
+        values[START],
+        values[PERIOD],
+        mass,
+        stiffness,
+        damping,
+        integral,
+        limit,
+        set_point(values),
+        values[FILTER_TIME],
+        values[PULL_TIME],
+        1.0 / w,
     )
 
 
+@inlined
 def initial_control(hold: Array, pose: Array) -> ControlState:
     """State that applies the constant thrust `hold` (3,); pose (3,) is x, y, yaw."""
-    reference = np.vstack([pose, np.zeros((2, 3))])
-    return ControlState(-1, 0.0, reference, np.zeros(3), hold, -hold)
+    reference = np.zeros((3, 3))
+    fill(reference[0], pose)
+    return ControlState(-1.0, 0.0, reference, np.zeros(3), hold, -hold)
 
 
+@inlined
+def remembered(memory: Array) -> ControlState:
+    """The state that `memory` (20,) holds."""
+    reference = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            reference[i, j] = memory[2 + 3 * i + j]
+    return ControlState(memory[0], memory[1], reference, memory[11:14], memory[14:17], memory[17:20])
+
+
+@inlined
+def remember(state: ControlState, memory: Array) -> None:
+    """Fill `memory` (20,) with the state."""
+    memory[0], memory[1] = state.sample, state.time
+    for i in range(3):
+        for j in range(3):
+            memory[2 + 3 * i + j] = state.reference[i, j]
+        memory[11 + i], memory[14 + i], memory[17 + i] = state.integral[i], state.thrust[i], state.pull[i]
+
+
+@kernel
 def wrap(angle: float) -> float:
     """The angle, rad, in [-pi, pi)."""
-    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+    return angle - 2.0 * math.pi * np.floor(angle / (2.0 * math.pi) + 0.5)
 
 
+@inlined
 def filtered(reference: Array, set_point: Array, time_constant: float, dt: float) -> Array:
     """Reference (3, 3) after dt: exact solution of (1 + T d/dt)^3 eta_d = set_point."""
-    rate = 1.0 / time_constant
+    rate, after = 1.0 / time_constant, np.empty((3, 3))
     decay = math.exp(-rate * dt)
-    eta, eta_dot, eta_ddot = reference
-    offset = eta - set_point
-    c1 = eta_dot + rate * offset
-    c2 = 0.5 * (eta_ddot + 2.0 * rate * eta_dot + rate * rate * offset)
-    x = decay * (offset + dt * (c1 + dt * c2))
-    x_dot = decay * (c1 + 2.0 * dt * c2) - rate * x
-    x_ddot = decay * 2.0 * c2 - 2.0 * rate * x_dot - rate * rate * x
-    return np.array([set_point + x, x_dot, x_ddot])
+    for i in range(3):
+        eta, eta_dot, eta_ddot = reference[0, i], reference[1, i], reference[2, i]
+        offset = eta - set_point[i]
+        c1 = eta_dot + rate * offset
+        c2 = 0.5 * (eta_ddot + 2.0 * rate * eta_dot + rate * rate * offset)
+        x = decay * (offset + dt * (c1 + dt * c2))
+        x_dot = decay * (c1 + 2.0 * dt * c2) - rate * x
+        after[0, i], after[1, i] = set_point[i] + x, x_dot
+        after[2, i] = decay * 2.0 * c2 - 2.0 * rate * x_dot - rate * rate * x
+    return after
 
 
-def heading(yaw: float) -> Array:
-    """Rotation (3, 3) of (surge, sway, yaw moment) along the heading to (x, y, yaw moment) in e."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
+@inlined
 def pid(law: Law, reference: Array, integral: Array, pull: Array, pose: Array, velocity: Array, dt: float) -> tuple[Array, Array]:
     """Integral (3,) and thrust (3,), both in e, at a sample dt after the last one; pose (x, y, yaw) and its rate."""
-    along = heading(pose[2])
-    offset = reference[0] - pose
-    offset[2] = wrap(offset[2])
-    error, rate, acceleration, total, pull = np.array([offset, reference[1] - velocity, reference[2], integral, pull]) @ along
-    total += dt * law.integral * error
-    wanted = law.stiffness * error + law.damping * rate + law.mass * acceleration + total - pull
-    thrust = np.maximum(np.minimum(wanted, law.limit), -law.limit)
-    total += (1.0 - math.exp(-dt / law.tracking_time)) * (thrust - wanted)  # back-calculation against windup
-    return along @ total, along @ thrust
+    along, rows = heading(pose[2]), np.empty((5, 3))
+    for i in range(3):
+        rows[0, i], rows[1, i], rows[2, i] = reference[0, i] - pose[i], reference[1, i] - velocity[i], reference[2, i]
+        rows[3, i], rows[4, i] = integral[i], pull[i]
+    rows[0, 2] = wrap(rows[0, 2])
+    rows = product(rows, along)  # along the heading: error, rate, acceleration, integral, pull
+    total, thrust = np.empty(3), np.empty(3)
+    tracked = 1.0 - math.exp(-dt / law.tracking_time)
+    for i in range(3):
+        total[i] = rows[3, i] + dt * law.integral[i] * rows[0, i]
+        wanted = law.stiffness[i] * rows[0, i] + law.damping[i] * rows[1, i] + law.mass[i] * rows[2, i] + total[i] - rows[4, i]
+        thrust[i] = max(min(wanted, law.limit[i]), -law.limit[i])
+        total[i] += tracked * (thrust[i] - wanted)  # back-calculation against windup
+    return apply(along, total), apply(along, thrust)
 
 
-def due_sample(law: Law, state: ControlState, time: float) -> int | None:
-    """Number of the sample due at `time`, s; None if there is none."""
-    sample = math.floor((time - law.start) / law.period + GRID_TOLERANCE)
-    return sample if sample > state.sample and sample >= 0 else None
+@inlined
+def due_sample(law: Law, state: ControlState, time: float) -> float:
+    """Number of the sample due at `time`, s; -1 if there is none."""
+    sample = np.floor((time - law.start) / law.period + GRID_TOLERANCE)
+    return sample if sample > state.sample and sample >= 0.0 else -1.0
 
 
-def sampled(law: Law, state: ControlState, sample: int, time: float, pose: Array, velocity: Array) -> ControlState:
+@inlined
+def sampled(law: Law, state: ControlState, sample: float, time: float, pose: Array, velocity: Array) -> ControlState:
     """State after sample number `sample` taken at `time`, s; pose (3,) is x, y, yaw and velocity (3,) its rate, in e."""
-    if state.sample < 0:
-        dt, integral = 0.0, state.thrust + state.pull
-        reference = np.array([pose, velocity, np.zeros(3)])
+    dt, integral, reference = 0.0, state.integral, np.zeros((3, 3))
+    if state.sample < 0.0:
+        integral = state.thrust + state.pull
+        fill(reference[0], pose)
+        fill(reference[1], velocity)
     else:
-        dt, integral = time - state.time, state.integral
-        set_point = law.set_point.copy()
+        dt, set_point = time - state.time, law.set_point.copy()
         set_point[2] = state.reference[0, 2] + wrap(law.set_point[2] - state.reference[0, 2])
         reference = filtered(state.reference, set_point, law.filter_time, dt)
     integral, thrust = pid(law, reference, integral, state.pull, pose, velocity, dt)
     return ControlState(sample, time, reference, integral, thrust, state.pull)
 
 
+@inlined
+def controlled(law: Law, state: ControlState, time: float, position: Array, quaternion: Array, nu: Array) -> ControlState:
+    """State with the thrust that acts from `time`, s, on: position (3,) in e, quaternion (4,) b to e, body velocity nu (6,)."""
+    sample = due_sample(law, state, time)
+    if sample < 0.0:
+        return state
+    rotation, pose = rotation_matrix(quaternion), position.copy()
+    pose[2] = angles_from_quaternion(quaternion)[2]
+    velocity = apply(rotation, nu[:3])
+    velocity[2] = apply(rotation, nu[3:])[2]
+    return sampled(law, state, sample, time, pose, velocity)
+
+
+@inlined
 def with_pull(law: Law, state: ControlState, pull: Array, h: float) -> ControlState:
     """State after an accepted step h, s, with the pull (3,) of the pipe held over it: first-order low-pass, exact for a held value."""
-    share = -math.expm1(-h / law.pull_time)
-    return state._replace(pull=state.pull + share * (pull - state.pull))
+    if math.isnan(law.period):
+        return state
+    share, low = -math.expm1(-h / law.pull_time), np.empty(3)
+    for i in range(3):
+        low[i] = state.pull[i] + share * (pull[i] - state.pull[i])
+    return ControlState(state.sample, state.time, state.reference, state.integral, state.thrust, low)
+
+
+@kernel
+def holds_for_good(values: Array) -> bool:
+    """Whether no controller ever takes over from a hold thrust that pushes."""
+    return math.isnan(values[PERIOD]) and (values[HOLD][0] != 0.0 or values[HOLD][1] != 0.0)
+
+
+@inlined
+def hold_energy(values: Array, position: Array) -> float:
+    """Potential, J, of a thrust that holds for good, zero at the start: a constant force supplies nothing that it cannot take back."""
+    if not holds_for_good(values):
+        return 0.0
+    return -values[HOLD][0] * (position[0] - values[AT_START[0]]) - values[HOLD][1] * (position[1] - values[AT_START[1]])

@@ -9,6 +9,17 @@ from typing import Literal
 
 from .checks import check_fields, number
 
+NEEDS_TABLE = "must be given with profile = 'table', and only then"
+
+
+def time_factor(time: float, start: float, ramp: float, period: float) -> float:
+    """Factor of a current at `time`: 0 before `start`, then a raised cosine of length `ramp`; the sign changes every `period`, all in s."""
+    since = time - start
+    if since < 0.0:
+        return 0.0
+    factor = 0.5 * (1.0 - math.cos(math.pi * since / ramp)) if since < ramp else 1.0
+    return -factor if period > 0.0 and since / period % 2.0 >= 1.0 else factor
+
 
 @dataclass(frozen=True)
 class Current:
@@ -27,30 +38,21 @@ class Current:
     def __post_init__(self) -> None:
         check_fields(self)
         if (self.profile == "table") != bool(self.depths):
-            raise ValueError(f"depths = {self.depths!r}: must be given with profile = 'table', and only then")
+            raise ValueError(f"depths = {self.depths!r}: {NEEDS_TABLE}")
         if len(self.factors) != len(self.depths):
             raise ValueError(f"factors = {self.factors!r}: must have as many entries as depths ({len(self.depths)})")
         if any(b <= a for a, b in zip(self.depths, self.depths[1:], strict=False)):
             raise ValueError(f"depths = {self.depths!r}: must ascend")
 
     def time_factor(self, time: float) -> float:
-        """Factor of time: 0 before `start`, then the ramp, with the sign of the period."""
-        since = time - self.start
-        if since < 0.0:
-            return 0.0
-        factor = 0.5 * (1.0 - math.cos(math.pi * since / self.ramp)) if since < self.ramp else 1.0
-        return -factor if self.period > 0.0 and math.floor(since / self.period) % 2 else factor
+        """Factor of time at `time` [s]."""
+        return time_factor(time, self.start, self.ramp, self.period)
 
     def shape(self, depth: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Depths below the surface [m] and factors of the profile in water of `depth` [m]; linear between, constant beyond."""
         if self.profile == "table":
             return self.depths, self.factors
         return (0.0, depth), ((1.0, 0.0) if self.profile == "linear" else (1.0, 1.0))
-
-    def surface_velocity(self, time: float, depth: float) -> tuple[float, float, float]:
-        """Velocity [m/s], in e, of the surface water at `time` [s]."""
-        factor = self.time_factor(time) * self.shape(depth)[1][0]
-        return (factor * self.velocity[0], factor * self.velocity[1], factor * self.velocity[2])
 
 
 @dataclass(frozen=True)

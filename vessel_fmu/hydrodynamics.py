@@ -15,15 +15,29 @@ dissipates, while -nu_c . d(nu_r) is the power that the current supplies. Quadra
 cross-flow principle, strip by strip at the stations of a Gauss rule, d_v = sum c_i |v + x_i r| (v + x_i r).
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from .attitude import Array, dot
-from .compiled import kernel
-from .parameters import VesselParameters, mass_matrix, symmetric_matrix
+from .compiled import inlined, kernel
+from .environment import time_factor
+from .parameters import SURFACE_FACTOR, place
+from .rigid_body import mass_matrix, symmetric_matrix
 
 STRIPS = 8
+STATIONS, SHARES = np.polynomial.legendre.leggauss(STRIPS)
+MASS, INERTIA, ADDED_MASS, DAMPING = place("mass"), place("inertia"), place("added_mass"), place("damping")
+WATERPLANE, FLOTATION, HANG_OFF = place("waterplane_area"), place("flotation_centre"), place("hang_off")
+GM_L, GM_T = place("longitudinal_metacentric_height"), place("metacentric_height")
+DENSITY, GRAVITY = place("environment.water_density"), place("environment.gravity")
+LENGTH, BEAM, DRAUGHT, MIDSHIP, SURGE_DRAG, CROSS_FLOW = (
+    place(f"drag.{name}") for name in ("length", "beam", "draft", "midship", "surge_coefficient", "cross_flow_coefficient")
+)
+VELOCITY, START, RAMP, PERIOD = (place(f"environment.current.{name}") for name in ("velocity", "start", "ramp", "period"))
+
+current_factor = kernel(time_factor)
 
 
 class Hull(NamedTuple):
@@ -38,27 +52,36 @@ class Hull(NamedTuple):
     hang_off: Array  # (3,), m
 
 
-def hull_constants(parameters: VesselParameters) -> Hull:
-    """The constants of `parameters`; what is absent has coefficient zero."""
-    sea, drag = parameters.environment, parameters.drag
-    weight = parameters.mass * sea.gravity
-    stiffness = np.array([
-        sea.water_density * sea.gravity * parameters.waterplane_area,
-        weight * parameters.longitudinal_metacentric_height,
-        weight * parameters.metacentric_height,
-    ])  # fmt: skip
-    strips, surge_drag = np.zeros((0, 2)), 0.0
-    if drag is not None:
-        pressure = 0.5 * sea.water_density * drag.draft
-        surge_drag = pressure * drag.beam * drag.surge_coefficient
-        station, share = np.polynomial.legendre.leggauss(STRIPS)
-        strips = np.column_stack([
-            drag.midship + 0.5 * drag.length * station,
-            0.5 * drag.length * share * pressure * drag.cross_flow_coefficient,
-        ])  # fmt: skip
-    damping = np.zeros((6, 6)) if parameters.damping is None else symmetric_matrix(parameters.damping)
-    hang_off, flotation = np.array(parameters.hang_off), float(parameters.flotation_centre)
-    return Hull(mass_matrix(parameters), damping, stiffness, flotation, surge_drag, strips, hang_off)
+@kernel
+def hull_constants(values: Array) -> Hull:
+    """The hull of the parameters' `values`; what is absent has coefficient zero."""
+    density, gravity = values[DENSITY], values[GRAVITY]
+    stiffness = np.empty(3)
+    stiffness[0] = density * gravity * values[WATERPLANE]
+    stiffness[1] = values[MASS] * gravity * values[GM_L]
+    stiffness[2] = values[MASS] * gravity * values[GM_T]
+    has_drag = not math.isnan(values[LENGTH])
+    strips, surge_drag = np.empty((STRIPS if has_drag else 0, 2)), 0.0
+    if has_drag:
+        pressure, half = 0.5 * density * values[DRAUGHT], 0.5 * values[LENGTH]
+        surge_drag = pressure * values[BEAM] * values[SURGE_DRAG]
+        for k in range(STRIPS):
+            strips[k, 0] = values[MIDSHIP] + half * STATIONS[k]
+            strips[k, 1] = half * SHARES[k] * pressure * values[CROSS_FLOW]
+    damping = np.zeros((6, 6)) if math.isnan(values[DAMPING][0]) else symmetric_matrix(values[DAMPING])
+    mass = mass_matrix(values[MASS], values[INERTIA], values[ADDED_MASS])
+    return Hull(mass, damping, stiffness, values[FLOTATION], surge_drag, strips, values[HANG_OFF])
+
+
+@inlined
+def surface_current(values: Array, time: float) -> Array:
+    """Current velocity (3,), m/s in e, of the surface water at `time`, s; zero where there is none."""
+    velocity = np.zeros(3)
+    if not math.isnan(values[START]):
+        factor = current_factor(time, values[START], values[RAMP], values[PERIOD]) * values[SURFACE_FACTOR]
+        for i in range(3):
+            velocity[i] = factor * values[VELOCITY][i]
+    return velocity
 
 
 @kernel
@@ -70,9 +93,7 @@ def restoring_energy(stiffness: Array, flotation: float, heave: float, rotation:
 
 
 @kernel
-def add_restoring(
-    stiffness: Array, flotation: float, heave: float, down: Array, axis: Array, nu: Array, h: float, force: Array
-) -> None:
+def add_restoring(stiffness: Array, flotation: float, heave: float, down: Array, axis: Array, nu: Array, h: float, force: Array) -> None:
     """Add the mean of dU over a step, left-hand side of (48), to `force` (6,), N and N m in b.
 
     `heave`, m, and `down` = R_old^T e3 (3,) are those at the start of the step, `axis` (3,) the mean of R^T e3, nu (6,)

@@ -30,7 +30,7 @@ from .attitude import (
     product,
     rotation_matrix,
 )
-from .compiled import kernel
+from .compiled import inlined, kernel
 from .hydrodynamics import Hull, add_drag, add_restoring
 from .rigid_body import add_coriolis
 
@@ -200,7 +200,7 @@ def works(hull: Hull, loads: Array, nu: Array, v: Array, top: Array, w: Array, r
     return out
 
 
-@kernel
+@inlined
 def advance(
     hull: Hull, position: Array, quaternion: Array, nu_old: Array, loads: Array, h: float
 ) -> tuple[Array, Array, Array, Array, Array, Array, int, float]:
@@ -224,12 +224,13 @@ def advance(
         thrust[i if i < 2 else 5] += loads[3, i]
     spatial[DOWN, 2] = 1.0
     held = product(spatial, rotation)  # rows R_old^T c
-    nu, iterations, error = newton(hull, position[2], nu_old, held, thrust, h, nu_old)
-    if not error < ROUND_OFF:  # large turns in a long step: follow the solution from shorter steps
-        nu = nu_old
-        for part in range(1, PARTS + 1):
-            nu, more, error = newton(hull, position[2], nu_old, held, thrust, h * part / PARTS, nu)
-            iterations += more
+    nu, iterations, error = nu_old, 0, 1.0
+    for part in range(PARTS + 1):  # at once, or for large turns in a long step: follow the solution from shorter steps
+        length, guess = h * part / PARTS if part > 0 else h, nu if part > 1 else nu_old
+        nu, more, error = newton(hull, position[2], nu_old, held, thrust, length, guess)
+        iterations += more
+        if part == 0 and error < ROUND_OFF:
+            break
 
     mean = product(rotation, mean_rotation(nu[3:], h))
     path, relative = nu[:3].copy(), nu.copy()

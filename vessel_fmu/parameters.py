@@ -16,15 +16,17 @@ N m s viscous damping. Drag coefficients, thrust limits and times of the control
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from .attitude import Array
 from .checks import check_fields, number
 from .environment import Environment
+from .rules import check, refused_added_mass, refused_damping, refused_limits, refused_ratio
+from .vectors import numbers, vector
 
 Vector3 = tuple[float, float, float]
-MODES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-COUPLINGS = ("surge_heave", "surge_pitch", "heave_pitch", "sway_roll", "sway_yaw", "roll_yaw")
 
 
 @dataclass(frozen=True)
@@ -67,9 +69,7 @@ class LinearDamping:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if np.linalg.eigvalsh(symmetric_matrix(self))[0] < -1e-12 * max(getattr(self, mode) for mode in MODES):
-            name = largest_coupling(self)
-            raise ValueError(f"{name} = {getattr(self, name):g}: must leave the damping positive semidefinite, with the other entries")
+        check(refused_damping, vector(self), within="damping")
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,7 @@ class Controller:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        routh = 2.0 * self.damping_ratio
-        if self.integral_ratio >= routh:
-            raise ValueError(f"integral_ratio = {self.integral_ratio:g}: must be < 2 damping_ratio = {routh:g}, or the loop is unstable")
+        check(refused_ratio, float(self.damping_ratio), float(self.integral_ratio), within="controller")
 
 
 @dataclass(frozen=True)
@@ -148,44 +146,25 @@ class VesselParameters:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if np.linalg.eigvalsh(mass_matrix(self))[0] <= 0.0:
-            name = largest_coupling(self.added_mass)
-            value = getattr(self.added_mass, name)
-            raise ValueError(f"added_mass.{name} = {value:g}: must leave the 6 x 6 mass matrix positive definite, with the others")
-        if self.controller is not None:
-            self._check_hold(self.controller)
-
-    def _check_hold(self, controller: Controller) -> None:
-        yaw, (x, y, moment) = self.start.attitude[2], self.hold_force
-        surge, sway = math.cos(yaw) * x + math.sin(yaw) * y, math.cos(yaw) * y - math.sin(yaw) * x
-        for mode, value, unit in (("surge", surge, "N"), ("sway", sway, "N"), ("yaw", moment, "N.m")):
-            limit = getattr(controller, f"{mode}_limit")
-            if abs(value) > limit:
-                rule = f"must be >= the hold thrust {abs(value):.6g} {unit}"
-                raise ValueError(f"controller.{mode}_limit = {limit:g}: {rule}")
+        check(refused_added_mass, float(self.mass), np.array(self.inertia, float), vector(self.added_mass))
+        if (c := self.controller) is not None:
+            limits = np.array([c.surge_limit, c.sway_limit, c.yaw_limit], float)
+            check(refused_limits, np.array(self.hold_force, float), float(self.start.attitude[2]), limits)
 
 
-def set_point(parameters: VesselParameters) -> tuple[float, float, float]:
-    """Set-point x, y [m], in e, and heading [rad] of a vessel with a controller: what it names, else where the vessel starts."""
-    named, ((x, y, _), (_, _, yaw)) = parameters.controller, (parameters.start.position, parameters.start.attitude)
-    assert named is not None
-    return x if named.x is None else named.x, y if named.y is None else named.y, yaw if named.yaw is None else named.yaw
+def values(parameters: VesselParameters) -> Array:
+    """All that the kernels know of a vessel: its numbers, then the factor of the current at the surface, which its profile has there."""
+    sea = parameters.environment
+    return np.append(vector(parameters), np.nan if sea.current is None else sea.current.shape(sea.depth)[1][0])
 
 
-def largest_coupling(entries: AddedMass | LinearDamping) -> str:
-    """Name of the coupling that is largest in magnitude."""
-    return max(COUPLINGS, key=lambda name: abs(getattr(entries, name)))
+NAMES = tuple(it.name for it in numbers(VesselParameters, None))
+SURFACE_FACTOR = len(NAMES)  # place in the values
 
 
-def symmetric_matrix(entries: AddedMass | LinearDamping) -> np.ndarray:
-    """6 x 6 matrix of the named entries."""
-    matrix = np.diag([getattr(entries, mode) for mode in MODES])
-    for coupling in COUPLINGS:
-        i, j = (MODES.index(mode) for mode in coupling.split("_"))
-        matrix[i, j] = matrix[j, i] = getattr(entries, coupling)
-    return matrix
-
-
-def mass_matrix(parameters: VesselParameters) -> np.ndarray:
-    """M = M_RB + M_A, eqs. (37), (38), 6 x 6 about the centre of gravity, in b."""
-    return np.diag([parameters.mass] * 3 + list(parameters.inertia)) + symmetric_matrix(parameters.added_mass)
+def place(name: str) -> Any:
+    """Where in the values a number is, or the slice that a table or a fixed tuple takes."""
+    if name in NAMES:
+        return NAMES.index(name)
+    inside = [i for i, one in enumerate(NAMES) if one.startswith((f"{name}.", f"{name}["))]
+    return slice(inside[0], inside[-1] + 1)

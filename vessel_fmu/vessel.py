@@ -1,30 +1,19 @@
-"""The vessel as a whole: constants from the parameters, states as values, and the step as a function of them.
-
-Ports refer to the hang-off point r_t; the pipe section held there has the orientation R_t = R_b (R_b^t)^T with R_b^t =
-R_y(-alpha), turned further by the departure rotation vector rho in b: R_t = R_b exp(rho) R_y(alpha).
-"""
+"""The vessel as a whole: states as values, and the step as a function of them, by the kernels that the unit runs."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .attitude import (
-    Array,
-    add_cross,
-    angles_from_quaternion,
-    exp_quaternion,
-    multiply,
-    quaternion_from_angles,
-    rotation_matrix,
-)
-from .dp_controller import ControlState, control_law, due_sample, heading, initial_control, sampled, with_pull
-from .hydrodynamics import add_drag, add_restoring, hull_constants, restoring_energy
-from .integrator import ROUND_OFF, advance
+from . import native, pose
+from .attitude import Array, along_heading, angles_from_quaternion, rotation_matrix
+from .dp_controller import HOLD, ControlState, control_law, controlled, hold_energy, remembered
+from .hydrodynamics import add_drag, add_restoring, hull_constants, restoring_energy, surface_current
+from .notes import blank, texts
 from .parameters import VesselParameters
+from .ports import INPUTS
 from .rigid_body import kinetic_energy
 
 ZERO3 = np.zeros(3)
-WORKS = ("bond_work", "control_work", "environment_work", "current_work", "damping_dissipation", "drag_dissipation")
 
 
 class Inputs(NamedTuple):
@@ -40,14 +29,14 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """State of the vessel with the means of the step that led to it; values are never mutated."""
+    """State of the vessel with the means of the step that led to it, the parts of native.STATE; values are never mutated."""
 
-    position: Array  # (3,) m, x and y in e, z counted from the heave equilibrium (keeps round-off of the energy small)
-    quaternion: Array  # (4,) b to e
-    body_velocity: Array  # (6,) m/s, rad/s
-    mean_velocity: Array  # (6,) at the hang-off point, in e, over the last step
-    mobility: Array  # (6, 6) dV/dF of the last step
-    works: Array  # (6,) J since the start, in the order of WORKS
+    position: Array  # (3,)
+    quaternion: Array  # (4,)
+    body_velocity: Array  # (6,)
+    mean_velocity: Array  # (6,)
+    mobility: Array  # (6, 6)
+    works: Array  # (6,)
     control: ControlState
 
 
@@ -56,8 +45,7 @@ class Step(NamedTuple):
 
     state: State
     converged: bool
-    iterations: int
-    residual: float  # unbalance left, over the terms that make it up
+    message: str  # what Newton left, without convergence
 
 
 class Vessel:
@@ -66,71 +54,39 @@ class Vessel:
     def __init__(self, parameters: VesselParameters) -> None:
         self.parameters = parameters
         self.depth = parameters.environment.depth
-        self.current = parameters.environment.current
-        self.hull = hull_constants(parameters)
-        self.law = control_law(parameters)
-        pitched = exp_quaternion(np.array([0.0, 1.0, 0.0]), parameters.departure_angle)
-        self.held_section = multiply(exp_quaternion(np.array(parameters.departure_rotation), 1.0), pitched)  # t to b
+        self.constants = native.constants(parameters)
+        self.hull = hull_constants(self.constants)
+        self.law = control_law(self.constants)
 
     def start(self) -> State:
         """State at the start: pose and velocity of the parameters, hold thrust, and the mobility zero of a step of no length."""
-        start = self.parameters.start
-        position = np.add(start.position, (0.0, 0.0, self.depth))
-        quaternion = quaternion_from_angles(*start.attitude)
-        nu = np.array([*start.velocity, *start.angular_velocity])
-        mean_velocity = self.hang_off_velocity(quaternion, nu)
-        pose = np.array([position[0], position[1], start.attitude[2]])
-        control = initial_control(np.array(self.parameters.hold_force), pose)
-        return State(position, quaternion, nu, mean_velocity, np.zeros((6, 6)), np.zeros(len(WORKS)), control)
+        return from_vector(native.started(self.parameters)[0])
 
     def step(self, state: State, time: float, h: float, inputs: Inputs) -> Step:
         """Step of length h, s, from `time`, s; discretely passive for any h. Raises ValueError for h <= 0."""
         if not h > 0.0:
             raise ValueError(f"h = {h}: must be > 0 s")
-        control = self.control(state, time)
-        loads = np.array([
-            inputs.force,
-            inputs.moment,
-            control.thrust,
-            inputs.control_force,
-            inputs.environment_force,
-            inputs.environment_moment,
-            self.surface_current(time + 0.5 * h),
-            inputs.environment_force_b,
-            inputs.environment_moment_b,
-        ])  # fmt: skip
-        position, quaternion, nu, mean_velocity, mobility, works, iterations, residual = advance(
-            self.hull, state.position, state.quaternion, state.body_velocity, loads, h
-        )
-        if not residual < ROUND_OFF:
-            return Step(state, False, iterations, residual)
-        if self.law is not None:
-            moment = self.moment_about_centre(state.quaternion, inputs.force, inputs.moment)
-            pull = np.array([inputs.force[0], inputs.force[1], moment[2]])
-            control = with_pull(self.law, control, pull, h)
-        new = State(position, quaternion, nu, mean_velocity, mobility, state.works + works, control)
-        return Step(new, True, iterations, residual)
+        given, after = np.concatenate([getattr(inputs, name, ZERO3) for name in INPUTS]), np.empty(native.N_STATE)
+        notes = blank()
+        if native.unit_step(self.constants, given, float(time), float(h), to_vector(state), after, notes) != 0:
+            return Step(state, False, texts(notes, native.MESSAGES)[0])
+        return Step(from_vector(after), True, "")
 
     def control(self, state: State, time: float) -> ControlState:
         """Memory of the controller with the thrust that acts from `time`, s, on."""
-        if self.law is None or (sample := due_sample(self.law, state.control, time)) is None:
-            return state.control
-        rotation = rotation_matrix(state.quaternion)
-        v, w = rotation @ state.body_velocity[:3], rotation @ state.body_velocity[3:]
-        pose = np.array([state.position[0], state.position[1], angles_from_quaternion(state.quaternion)[2]])
-        return sampled(self.law, state.control, sample, time, pose, np.array([v[0], v[1], w[2]]))
+        return controlled(self.law, state.control, float(time), state.position, state.quaternion, state.body_velocity)
 
     def surface_current(self, time: float) -> Array:
         """Current velocity (3,), m/s in e, at the surface."""
-        return ZERO3 if self.current is None else np.array(self.current.surface_velocity(time, self.depth))
+        return surface_current(self.constants, float(time))
 
     def position(self, state: State) -> Array:
         """Centre of gravity (3,), m in e."""
-        return state.position - [0.0, 0.0, self.depth]
+        return pose.centre(self.constants, state.position)
 
     def thrust(self, state: State) -> Array:
         """Thrust (3,) of the own controller or hold along the heading: surge, sway, N; yaw, N m."""
-        return state.control.thrust @ heading(angles_from_quaternion(state.quaternion)[2])
+        return along_heading(angles_from_quaternion(state.quaternion)[2], state.control.thrust)
 
     def kinetic_energy(self, state: State) -> float:
         """Kinetic energy, J, of hull and added mass."""
@@ -141,27 +97,20 @@ class Vessel:
         return restoring_energy(self.hull.stiffness, self.hull.flotation, state.position[2], rotation_matrix(state.quaternion))
 
     def hold_energy(self, state: State) -> float:
-        """Potential, J, of a thrust that holds for good, zero at the start: a constant force supplies nothing that it cannot take back."""
-        if self.law is not None:
-            return 0.0
-        (x, y, _), start = self.parameters.hold_force, self.parameters.start.position
-        return -x * float(state.position[0] - start[0]) - y * float(state.position[1] - start[1])
+        """Potential, J, of a thrust that holds for good, zero at the start."""
+        return hold_energy(self.constants, state.position)
 
     def hang_off_pose(self, position: Array, quaternion: Array) -> tuple[Array, Array]:
-        """Hang-off point (3,), m in e, and orientation (4,) t to e of the pipe section held there, eq. (5)."""
-        point = position + rotation_matrix(quaternion) @ self.hull.hang_off
-        return point, multiply(quaternion, self.held_section)
+        """Hang-off point (3,), m in e, and orientation (4,) t to e of the pipe section held there."""
+        return pose.hang_off_pose(self.constants, position, quaternion)
 
     def hang_off_velocity(self, quaternion: Array, nu: Array) -> Array:
-        """Velocity, m/s, and angular velocity, rad/s, of the hang-off point, (6,) in e, for a body velocity nu (6,); eq. (68)."""
-        rotation = rotation_matrix(quaternion)
-        return np.concatenate([rotation @ (nu[:3] + np.cross(nu[3:], self.hull.hang_off)), rotation @ nu[3:]])
+        """Velocity, m/s, and angular velocity, rad/s, of the hang-off point, (6,) in e, for a body velocity nu (6,)."""
+        return pose.hang_off_velocity(self.constants, quaternion, nu)
 
     def moment_about_centre(self, quaternion: Array, force: Array, moment: Array) -> Array:
         """Moment (3,), N m in e, about the centre of gravity of a force and a moment at the hang-off point."""
-        total = moment.copy()
-        add_cross(total, 1.0, rotation_matrix(quaternion) @ self.hull.hang_off, force)
-        return total
+        return pose.moment_about_centre(self.constants, quaternion, force, moment)
 
     def static_load(self, position: Array, quaternion: Array, current: Array = ZERO3) -> tuple[Array, Array]:
         """Force, N, and moment, N m, (3,) in e at the centre of gravity, on the hull at rest without the pipe's pull.
@@ -175,5 +124,16 @@ class Vessel:
         add_drag(self.hull.surge_drag, self.hull.strips, relative, load)
         down = rotation[2]
         add_restoring(self.hull.stiffness, self.hull.flotation, position[2] + self.depth, down, down, np.zeros(6), 0.0, load)
-        x, y, yaw = self.parameters.hold_force
+        x, y, yaw = self.constants[HOLD]
         return [x, y, 0.0] - rotation @ load[:3], [0.0, 0.0, yaw] - rotation @ load[3:]
+
+
+def to_vector(state: State) -> Array:
+    """The vector of a state, with nothing said of it."""
+    return np.concatenate([*(np.ravel(part) for part in (*state[:-1], *state.control)), np.zeros(native.STATE["told"])])
+
+
+def from_vector(vector: Array) -> State:
+    """The state that a vector holds."""
+    found = {name: vector[getattr(native.AT, name)] for name in State._fields}
+    return State(**found | {"mobility": found["mobility"].reshape(6, 6), "control": remembered(found["control"])})

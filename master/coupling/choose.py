@@ -8,7 +8,7 @@ from functools import partial
 from .bond import Bond
 from .energy_consistent import EnergyConsistent
 from .explicit import Explicit
-from .linearly_implicit import OneSolve
+from .linearly_implicit import LinearlyImplicit
 from .one_sided import OneSided
 from .scheme import Check, End, Scheme, accept
 
@@ -16,7 +16,7 @@ from .scheme import Check, End, Scheme, accept
 def _energy_consistent(impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float, check: Check) -> Scheme:
     """By iteration, with a single solve of what cannot roll back."""
     if not (impedance.rollback or impedance.yields):
-        return OneSolve(impedance, mobility, bond, macro_step, check)
+        return LinearlyImplicit(impedance, mobility, bond, macro_step, check)
     one_sided = not (impedance.rollback and mobility.rollback)
     return (OneSided if one_sided else EnergyConsistent)(impedance, mobility, bond, macro_step, tolerance, check)
 

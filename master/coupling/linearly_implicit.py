@@ -56,7 +56,7 @@ class History:
         self._shares[seen] = np.clip(np.linalg.solve(system, right[:, :, None])[:, :, 0], 0.0, LARGEST)
 
 
-class OneSolve:
+class LinearlyImplicit:
     """One solve of each end a step, no rollback. The slopes must not be underestimated; an end that offers none counts as rigid
     to what it is given (slope zero), which is stable only where that end answers weakly.
     """

@@ -13,7 +13,7 @@ import numpy as np
 from ..fmu.instance import StepRejected
 from .bond import Bond, Vector
 from .energy_consistent import PATIENCE, EnergyConsistent
-from .predicted_end import Foreseen
+from .predicted_end import PredictedEnd
 from .scheme import Check, CouplingFailed, End, Step, accept
 
 FIRST_STEP = 2.0**-10  # of the macro step: nothing is known yet
@@ -21,12 +21,12 @@ CLOSING = 4  # solves of the impedance end, at most, that close the energy of a 
 
 
 class OneSided(EnergyConsistent):
-    """EC-IJ with a `Foreseen` mobility end; an impedance end that yields need not roll back either."""
+    """EC-IJ with a `PredictedEnd` mobility end; an impedance end that yields need not roll back either."""
 
     def __init__(
         self, impedance: End, mobility: End, bond: Bond, macro_step: float, tolerance: float = 1e-9, check: Check = accept
     ) -> None:
-        self._foreseen = Foreseen(mobility, bond)
+        self._foreseen = PredictedEnd(mobility, bond)
         super().__init__(impedance, self._foreseen, bond, macro_step, tolerance, check)
         if self._smallest < macro_step:
             self.wanted, self._easy = FIRST_STEP * macro_step, -PATIENCE  # all short steps add up to whole macro steps

@@ -29,7 +29,7 @@ MEMORY = 0.5  # per step: how fast a foresight's past failure is forgotten
 FIT = 0.9  # per step: weight of the past in the fitted decay
 
 
-class Foreseen:
+class PredictedEnd:
     """A mobility end by its law; `take` solves the end itself, for good. Nothing need be foreseen of an end that can roll back."""
 
     rollback, yields = True, False

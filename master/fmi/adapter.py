@@ -89,6 +89,10 @@ class UnitSlave(Fmi2Slave):
         nominal = (unit.nominal(self.parameters) if hasattr(unit, "nominal") else {}) | self._nominal
         return self.ports.variables(getattr(unit, "RANGES", {}), nominal)
 
+    def own_name(self, name: str) -> str:
+        """The unit's own name of a parameter, "" of one that it does not know."""
+        return self._fields.get(name, "")
+
     # life cycle
 
     @guarded

@@ -15,6 +15,7 @@ import importlib.metadata
 import json
 import os
 import shutil
+import subprocess
 import sys
 import tempfile
 import uuid
@@ -32,14 +33,15 @@ from pythonfmu import FmuBuilder
 
 from ..errors import RunError
 from ..process.locks import locked
-from . import cache, entry, licenses, loader, portable
+from . import cache, entry, licenses, loader
 from .cache import cache_folder
 from .document import icon_png, page_html
-from .portable import EPOCH
+from .loader import interpreter
 
 HERE = Path(__file__).parent
 BUNDLED = ("adapter.py", "description.py", "failure.py", "ports.py", "schema.py", "server.py", "state.py")
 LINUX = "binaries/linux64/"
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date a zip archive can hold: equal contents, equal bytes
 CAPABILITIES = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
 
 
@@ -49,9 +51,8 @@ class Recipe:
 
     `package` is the folder of the unit package, `unit` the place of its class in it (``slave.PipeUnit``), `parameters`
     the nested mapping that becomes the defaults. Without a `description` the unit's own is taken. `experiment` may hold
-    start_time, stop_time, step_size, tolerance; `inputs` the start values of inputs that do not start at zero. A `portable`
-    FMU brings its own Python and compiled kernels (see `portable`); any other needs a Python on the machine. `nominal` holds nominal values
-    by port, where they are not those of its unit of measure.
+    start_time, stop_time, step_size, tolerance; `inputs` the start values of inputs that do not start at zero. `nominal` holds nominal
+    values by port, where they are not those of its unit of measure.
     """
 
     package: Path
@@ -62,7 +63,6 @@ class Recipe:
     license: str = "MIT"
     experiment: Mapping[str, float] = field(default_factory=dict)
     inputs: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    portable: bool = False
     nominal: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -78,7 +78,7 @@ class Recipe:
     @property
     def digest(self) -> str:
         """Hash of everything the FMU's content follows from."""
-        facts = {"about": _about(self), **_content(self)}
+        facts = {"about": about(self), **content(self)}
         return _digest({"bundle": self.bundle, "facts": json.dumps(facts, sort_keys=True)})
 
 
@@ -86,21 +86,20 @@ def build_fmu(recipe: Recipe, destination: Path) -> Path:
     """Write the FMU to the file `destination`, whole or not at all.
 
     Raises ValueError if the unit refuses its parameters or declares a unit of measure that is not understood, RunError without a
-    compiler, or where a portable one cannot be made.
+    compiler.
     """
     destination.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="fmu_") as folder, _clean_imports():
         script, configuration = Path(folder, f"{recipe.bundle}_entry.py"), Path(folder, "fmu.json")
         shutil.copy(HERE / "entry.py", script)
-        about = {**_about(recipe), "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, recipe.digest))}
-        content = {"about": about, **_content(recipe)}
-        configuration.write_text(json.dumps(content, indent=1), encoding="utf-8")
+        facts = {"about": {**about(recipe), "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, recipe.digest))}, **content(recipe)}
+        configuration.write_text(json.dumps(facts, indent=1), encoding="utf-8")
         bundle = Path(folder, recipe.bundle)
         for name, text in _sources(recipe).items():
             target = bundle / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(text)
-        capabilities = {**CAPABILITIES, "needsExecutionTool": not recipe.portable}
+        capabilities = {**CAPABILITIES, "needsExecutionTool": True}
         raw = FmuBuilder.build_FMU(script, dest=Path(folder, "raw.fmu"), project_files=[bundle, configuration], **capabilities)
         finished = destination.with_name(f".{os.getpid()}_{destination.name}")
         _finish(recipe, Path(raw), finished)
@@ -128,10 +127,19 @@ def compile_kernels(recipe: Recipe, fmu: Path) -> None:
     mark = unit / entry.COMPILED.format(_compiler())
     with locked(fmu):
         if not (mark.is_file() and any(unit.rglob("*.nbi"))):
-            with zipfile.ZipFile(fmu) as archive:
-                _kernels(recipe, {name: archive.read(name) for name in archive.namelist() if name.startswith("resources/")})
+            with tempfile.TemporaryDirectory(prefix="fmu_") as folder, zipfile.ZipFile(fmu) as archive:
+                archive.extractall(folder, [name for name in archive.namelist() if name.startswith("resources/")])
+                _start(Path(folder, "resources"), recipe.experiment.get("step_size", 0.01))
             with contextlib.suppress(OSError):  # settled elsewhere
                 mark.touch()
+
+
+def _start(resources: Path, step: float) -> None:
+    """Start the unit of an unpacked FMU once, in a process of its own, so that its kernels are compiled. Raises RunError."""
+    command = [sys.executable, "-I", "-B", str(HERE / "warm.py"), str(resources), str(step)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise RunError(f"the FMU does not start: {' '.join(done.stderr.split())[-1000:]}")
 
 
 def bundled_package(fmu: Path) -> ModuleType:
@@ -154,7 +162,8 @@ def _compiler() -> str:
     return hashlib.sha256(repr((sys.version, numba.__version__, host, settings)).encode()).hexdigest()[:12]
 
 
-def _about(recipe: Recipe) -> dict[str, str]:
+def about(recipe: Recipe) -> dict[str, str]:
+    """What the model description says of an FMU."""
     try:
         version = importlib.metadata.version("pipelay")
     except importlib.metadata.PackageNotFoundError:
@@ -163,7 +172,8 @@ def _about(recipe: Recipe) -> dict[str, str]:
     return about | ({"description": recipe.description} if recipe.description else {})
 
 
-def _content(recipe: Recipe) -> dict[str, Any]:
+def content(recipe: Recipe) -> dict[str, Any]:
+    """What an FMU is made with: parameters, experiment, inputs, nominal values."""
     parts = {"experiment": recipe.experiment, "inputs": recipe.inputs, "nominal": recipe.nominal}
     return {"parameters": recipe.parameters} | {name: dict(part) for name, part in parts.items()}
 
@@ -179,14 +189,14 @@ def _sources(recipe: Recipe) -> dict[str, bytes]:
     files["fmi_unit.py"] = f"from .fmi.adapter import UnitSlave\nfrom .{module} import {name} as Unit\n".encode()
     files["fmi/__init__.py"] = b""
     files.update({f"fmi/{source}": (HERE / source).read_bytes() for source in BUNDLED})
-    return files | ({"processor.txt": portable.PROCESSOR} if recipe.portable else {})
+    return files
 
 
 def _digest(parts: Mapping[str, str | bytes]) -> str:
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
-    for source in ("entry.py", "runtime.py", "loader.c", "portable.py"):
+    for source in ("entry.py", "runtime.py", "loader.c"):
         digest.update((HERE / source).read_bytes())
-    digest.update(portable.interpreter().encode())
+    digest.update(interpreter().encode())
     for name, content in sorted(parts.items()):
         data = content.encode() if isinstance(content, str) else content
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
@@ -194,41 +204,23 @@ def _digest(parts: Mapping[str, str | bytes]) -> str:
 
 
 def _finish(recipe: Recipe, raw: Path, finished: Path) -> None:
-    """Repack compressed, in fixed order and with fixed dates; add documentation, icon and loader, and to a portable FMU its Python."""
+    """Repack compressed, in fixed order and with fixed dates; add documentation, icon and loader."""
     with zipfile.ZipFile(raw) as source:
         foreign = [name for name in source.namelist() if name.startswith("binaries/") and not name.startswith(LINUX)]
         contents = {name: source.read(name) for name in source.namelist() if name not in foreign}  # PythonFMU's, which find no Python
     model = ElementTree.fromstring(contents["modelDescription.xml"])
-    about = recipe.package / "about.html"
-    contents["documentation/index.html"] = page_html(model, about.read_text(encoding="utf-8") if about.is_file() else "").encode()
+    text = recipe.package / "about.html"
+    contents["documentation/index.html"] = page_html(model, text.read_text(encoding="utf-8") if text.is_file() else "").encode()
     contents["model.png"] = icon_png()
     for name in (name for name in contents if name.startswith(LINUX)):
         contents[name] = loader.library(cache_folder("loaders"))
     contents["resources/runtime.py"] = (HERE / "runtime.py").read_bytes()
     contents |= licenses.entry(recipe.name, recipe.license, recipe.author)
     contents |= licenses.of_package("pipelay") | licenses.of_package("pythonfmu")
-    contents["resources/python.txt"] = portable.interpreter().encode()
-    if recipe.portable:
-        if not (compiled := _kernels(recipe, contents)):
-            place = cache_folder("units")
-            raise RunError(f"--portable: {recipe.name} left no compiled kernels in {place}; NUMBA_CACHE_DIR must not be set")
-        contents |= compiled
-        shutil.copy(portable.archive(cache_folder("runtimes")), finished)
-    with zipfile.ZipFile(finished, "a") as target:
+    contents["resources/python.txt"] = interpreter().encode()
+    with zipfile.ZipFile(finished, "w") as target:
         for name in sorted(contents):
             target.writestr(zipfile.ZipInfo(name, EPOCH), contents[name], zipfile.ZIP_DEFLATED)
-
-
-def _kernels(recipe: Recipe, contents: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The compiled kernels of the unit by their places in the FMU of these `contents`."""
-    with tempfile.TemporaryDirectory(prefix="fmu_") as folder:
-        for name, content in contents.items():
-            place = Path(folder, name)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content)
-        step = recipe.experiment.get("step_size", 0.01)
-        compiled = portable.kernels(Path(folder, "resources"), cache_folder("units") / recipe.bundle, step)
-    return {f"resources/{recipe.bundle}/{name}": content for name, content in compiled.items()}
 
 
 @contextlib.contextmanager

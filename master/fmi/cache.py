@@ -12,7 +12,7 @@ from ..errors import RunError
 from . import entry
 
 DAY, MINUTE = 86400.0, 60.0  # s
-KEPT = {"fmus": (200, MINUTE), "units": (16, DAY), "loaders": (8, MINUTE), "runtimes": (2, MINUTE)}
+KEPT = {"fmus": (200, MINUTE), "units": (16, DAY), "loaders": (8, MINUTE), "libraries": (32, DAY)}
 """How many of each kind, and how long after its use nothing goes: another process may be about to read it."""
 
 

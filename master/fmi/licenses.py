@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 FOLDER = "documentation/licenses"
@@ -17,7 +15,7 @@ def entry(model: str, license_name: str, author: str) -> dict[str, bytes]:
     text = (
         f"{model}: {license_name}, {author}.\n\n"
         "The folders beside this file hold, each under its name, the licences of pipelay, whose code this FMU is,\n"
-        "and of what it carries of others: parts of PythonFMU and, in a portable FMU, Python, its packages and\nshared libraries.\n"
+        "and of what it carries of others: parts of PythonFMU.\n"
     )
     return {f"{FOLDER}/license.txt": text.encode()}
 
@@ -33,13 +31,3 @@ def of_package(name: str) -> dict[str, bytes]:
         for file in files
         if _LICENSE.match(file.name) and file.suffix not in (".py", ".pyc")
     }
-
-
-def of_system(name: str, file: Path) -> dict[str, bytes]:
-    """The licence of a `file` of the system, as `of_package`: what its package says of it (Debian and its kin)."""
-    if not shutil.which("dpkg-query"):
-        return {}
-    names = {str(file), str(file.resolve())}  # /lib or /usr/lib
-    owner = subprocess.run(["dpkg-query", "-S", *names], capture_output=True, text=True).stdout.partition(":")[0]
-    text = Path("/usr/share/doc", owner, "copyright")
-    return {f"{FOLDER}/{name}/copyright": text.read_bytes()} if owner and text.is_file() else {}

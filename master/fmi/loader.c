@@ -3,9 +3,8 @@
    Every call becomes a request of bytes (function, instance, arguments), which resources/runtime.py answers with
    (status, result, log). It runs
      1. in a process of its own, by the interpreter that PIPELAY_PYTHON names;
-     2. in one of the Python inside the FMU (resources/python/linux64), if there is one;
-     3. in the host's interpreter, if the host runs one that has numpy and numba;
-     4. in a process of the interpreter that exported the FMU (resources/python.txt).
+     2. in the host's interpreter, if the host runs one that has numpy and numba;
+     3. in a process of the interpreter that exported the FMU (resources/python.txt).
    A process serves all instances of the library, ends with it, and cannot take the host down. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -18,7 +17,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -238,7 +236,7 @@ static int above_streams(int fd) {
     return moved;
 }
 
-static int start_process(Instance *it, const char *python, const char *resources, const char *libraries, const char *advice) {
+static int start_process(Instance *it, const char *python, const char *resources, const char *advice) {
     int ends[2], code = 0;
     char path[LONGEST_PATH];
     PATH_IN(path, resources, "runtime.py");
@@ -248,7 +246,6 @@ static int start_process(Instance *it, const char *python, const char *resources
     pid_t pid = fork();
     if (!pid) { /* a session of its own: Ctrl-C is for the host */
         setsid();
-        if (libraries) setenv("LD_LIBRARY_PATH", libraries, 1);
         while ((code = open("/dev/null", O_RDWR)) >= 0 && code < 3) {} /* streams that the host has closed */
         if (code > 2) close(code);
         dup2(2, 1);
@@ -269,25 +266,19 @@ static int start_process(Instance *it, const char *python, const char *resources
 
 static int start(Instance *it, const char *resources) {
     static const char advice[] = "; set PIPELAY_PYTHON to a Python with numpy and numba";
-    char path[LONGEST_PATH], python[LONGEST_PATH], libraries[LONGEST_PATH];
+    char path[LONGEST_PATH], python[LONGEST_PATH];
     if (py.handle || channel >= 0) return OK;
     PATH_IN(path, resources, "runtime.py");
     if (access(path, R_OK)) return complain(it, "resources: %s: %s", path, strerror(errno));
     const char *chosen = getenv("PIPELAY_PYTHON");
-    if (chosen && *chosen) return start_process(it, chosen, resources, NULL, " (PIPELAY_PYTHON)");
-    PATH_IN(libraries, resources, "python/linux64/lib");
-    PATH_IN(python, resources, "python/linux64/bin/python3");
-    if (!access(python, F_OK)) {
-        chmod(python, 0755); /* some unzip without permissions */
-        return start_process(it, python, resources, libraries, "");
-    }
+    if (chosen && *chosen) return start_process(it, chosen, resources, " (PIPELAY_PYTHON)");
     if (start_in_host(resources)) return OK;
     PATH_IN(path, resources, "python.txt");
     FILE *file = fopen(path, "r");
     size_t length = file ? fread(python, 1, sizeof python - 1, file) : 0;
     if (file) fclose(file);
     python[length] = 0;
-    return start_process(it, python, resources, NULL, advice);
+    return start_process(it, python, resources, advice);
 }
 
 __attribute__((destructor)) static void stop(void) {

@@ -7,15 +7,28 @@ import importlib.util
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import zlib
 from pathlib import Path
 
 from ..errors import RunError
-from .portable import interpreter
 
 SOURCE = Path(__file__).with_name("loader.c")
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-shared", "-s")
+
+
+def interpreter() -> str:
+    """Path of this interpreter, one however it was spelled: without links, but for the one that leads out of a virtual environment."""
+    path = Path(sys.executable)
+    path = path.parent.resolve() / path.name
+    while path.is_symlink():
+        target = path.parent / path.readlink()
+        target = target.parent.resolve() / target.name
+        if sys.prefix != sys.base_prefix and target.parent != path.parent:
+            break
+        path = target
+    return str(path)
 
 
 def compiler() -> list[str]:

@@ -16,20 +16,6 @@ import time
 GRACE = 1.0  # s to end of its own accord
 
 
-def choose_processor(resources):  # type: ignore[no-untyped-def]
-    """Have numba compile for the kind of processor that the FMU brings compiled kernels for, if this one is of the kind."""
-    path = os.path.join(resources, _slave_module(resources).removesuffix("_entry"), "processor.txt")
-    if not os.path.exists(path):
-        return
-    from llvmlite import binding  # not numba yet, which reads the environment when it is imported
-
-    with open(path, encoding="ascii") as file:
-        kind, *needed = file.read().split()
-    features = binding.get_host_cpu_features()
-    if all(features.get(feature) for feature in needed):
-        os.environ.update(NUMBA_CPU_NAME=kind, NUMBA_CPU_FEATURES="")
-
-
 def load(resources):  # type: ignore[no-untyped-def]
     """The function that answers requests, ``bytes -> bytes``. Raises ImportError with one line."""
     if sys.version_info < (3, 11):  # noqa: UP036  (any Python may be asked to run this)
@@ -90,7 +76,6 @@ def serve(descriptor):  # type: ignore[no-untyped-def]
         resources = os.path.dirname(os.path.abspath(__file__))
         os.environ.pop("NUMBA_DISABLE_JIT", None)  # meant for the host's own code
         try:
-            choose_processor(resources)
             answer = load(resources)
         except Exception as error:
             send(b"\1" + " ".join(str(error).split()).encode("utf-8", "replace") + b"\0")

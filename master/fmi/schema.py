@@ -34,6 +34,16 @@ class Parameter:
     maximum: float | None = None
     doc: str = ""
     items: tuple[str, ...] = ()  # of an enumeration
+    above: bool = False  # the minimum itself is refused
+    below: bool = False  # the maximum itself is refused
+
+    @property
+    def rule(self) -> str:
+        """What a number out of range is told."""
+        unit = f" {self.unit}" if self.unit not in ("", "1") else ""
+        low = [f"{'>' if self.above else '>='} {self.minimum:g}{unit}"] if self.minimum is not None else []
+        high = [f"{'<' if self.below else '<='} {self.maximum:g}{unit}"] if self.maximum is not None else []
+        return f"must be {' and '.join(low + high)}" if low or high else ""
 
 
 def build(cls: type[T], mapping: Mapping[str, Any], path: str = "") -> T:
@@ -177,7 +187,7 @@ def _parameter(value: Any, about: Mapping[str, Any], place: int = 0) -> Paramete
     lowest, highest = about.get("min", about.get("above")), about.get("max", about.get("below"))
     units = about.get("unit", "") if kind == "Real" else ""  # FMI gives units to reals only
     unit = units if isinstance(units, str) else units[place]
-    return Parameter(kind, value, unit, lowest, highest, about.get("doc", ""))
+    return Parameter(kind, value, unit, lowest, highest, about.get("doc", ""), above="above" in about, below="below" in about)
 
 
 def _items(hint: Any) -> tuple[str, ...]:

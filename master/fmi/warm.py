@@ -8,12 +8,13 @@ def main(resources: str, step: float) -> None:
     """Through initialisation, one step, and a look at every output. Raises what goes wrong."""
     runtime = runpy.run_path(f"{resources}/runtime.py")
     runtime["end_with_reader"](sys.stdout.fileno())
-    runtime["choose_processor"](resources)
     slave = runtime["load"](resources).__self__.slave_class(instance_name="warm", resources=resources, visible=False)
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
     slave.do_step(0.0, step)
+    if compile_all := getattr(slave.unit, "compile", None):
+        compile_all()
     slave.get_real([i for i, variable in enumerate(slave.variables()) if variable.causality == "output" and variable.kind == "Real"])
 
 

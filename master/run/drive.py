@@ -29,7 +29,7 @@ Row = dict[tuple[str, str], float]
 
 
 @dataclass(frozen=True)
-class Effort:
+class Cost:
     """Macro steps accepted and rejected, and steps asked of each unit."""
 
     macro_steps: int = 0
@@ -54,7 +54,7 @@ class Drive(Protocol):
         """The coupling in words."""
 
     @property
-    def effort(self) -> Any:
+    def cost(self) -> Any:
         """What it cost so far, a dataclass of counts."""
 
     def advance(self, end: float) -> None:
@@ -104,10 +104,10 @@ class Coupled(OnBond):
         self._coupling = coupling(rules.scheme, self._pipe, self._vessel, bond, self._macro_step, rules.tolerance, self.ledger.check)
 
     @property
-    def effort(self) -> Effort:
+    def cost(self) -> Cost:
         """See `Drive`."""
         done = self._coupling.counters
-        return Effort(done.steps, done.rejected_steps, self._pipe.solves, self._vessel.solves)
+        return Cost(done.steps, done.rejected_steps, self._pipe.solves, self._vessel.solves)
 
     def derived(self) -> Row:
         """See `Drive`."""
@@ -149,9 +149,9 @@ class Prescribed:
         self._steps = self._rejected = 0
 
     @property
-    def effort(self) -> Effort:
+    def cost(self) -> Cost:
         """See `Drive`."""
-        return Effort(self._steps, self._rejected, self._pipe.solves)
+        return Cost(self._steps, self._rejected, self._pipe.solves)
 
     def advance(self, end: float) -> None:
         """See `Drive`."""

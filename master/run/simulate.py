@@ -95,7 +95,7 @@ def _simulated(scene: Scene, folder: Path, scratch: Path, screen: TextIO) -> Res
             recorder.record_shape(drive.time)
         account: dict[str, Any] = {"coupling": drive.scheme, "physics": physics.acting(scene)}
         account |= {"start_remarks": scene_remarks.of(scene) | drive.remarks.start, "remarks": drive.remarks.summary()}
-        account |= {**_facts(drive), **asdict(ending), **asdict(drive.effort), **wall}
+        account |= {**_facts(drive), **asdict(ending), **asdict(drive.cost), **wall}
         account |= drive.ledger.summary()
         account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}
         account |= {"energy_check": ending.message if ending.status == "stopped" else drive.ledger.verdict()}

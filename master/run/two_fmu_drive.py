@@ -19,7 +19,7 @@ from master.scene.two_fmus import General
 
 
 @dataclass(frozen=True)
-class Effort:
+class Cost:
     """Macro steps accepted and rejected, and steps asked of each unit."""
 
     macro_steps: int
@@ -69,10 +69,10 @@ class Bonded(OnBond):
         return super().scheme + (f"; no step is halved, for {' and '.join(fixed)} cannot vary it" if fixed else "")
 
     @property
-    def effort(self) -> Effort:
+    def cost(self) -> Cost:
         """What it cost so far."""
         done = self._coupling.counters
-        return Effort(done.steps, done.rejected_steps, self._ends[0].solves, self._ends[1].solves)
+        return Cost(done.steps, done.rejected_steps, self._ends[0].solves, self._ends[1].solves)
 
     def advance(self, end: float) -> None:
         """Take one step, not beyond `end` [s]; the further connections hold what they carry now."""

@@ -26,7 +26,7 @@ def _number(doc: str, unit: str, **bounds: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Section:
+class SceneTable:
     """A table of numbers that checks its ranges when made; ValueError reads "key = value: rule"."""
 
     def __post_init__(self) -> None:
@@ -41,7 +41,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Simulation(Section):
+class Simulation(SceneTable):
     """[simulation]: how long, in what steps, and what is kept; statics need no such table."""
 
     duration: float = _number("time simulated; statics alone need no [simulation]", "s", above=0.0)
@@ -65,7 +65,7 @@ class Simulation(Section):
 
 
 @dataclass(frozen=True)
-class Coupling(Section):
+class Coupling(SceneTable):
     """[coupling]: how the units are coupled, and the energy check."""
 
     scheme: Literal["energy-consistent", "serial", "parallel"] = field(
@@ -88,7 +88,7 @@ class Coupling(Section):
 
 
 @dataclass(frozen=True)
-class Release(Section):
+class Release(SceneTable):
     """[start.release]: lets the vessel go displaced from its equilibrium, at rest."""
 
     heave: float = _number("down from the equilibrium", "m", default=0.0)
@@ -97,7 +97,7 @@ class Release(Section):
 
 
 @dataclass(frozen=True)
-class Start(Section):
+class Start(SceneTable):
     """[start]: where the vessel's hang-off point, or the top of a pipe alone, is held in the equilibrium."""
 
     x: float = _number("forward of the foot", "m")
@@ -115,7 +115,7 @@ class Start(Section):
 
 
 @dataclass(frozen=True)
-class TopMotion(Section):
+class TopMotion(SceneTable):
     """[top_motion]: harmonic displacement of the top of a pipe alone, faded in by a half cosine; held where there is no such table."""
 
     amplitude: tuple[float, float, float] = _number("amplitudes along x, y, z, in e", "m", usual=(-50.0, 50.0))
@@ -146,7 +146,7 @@ class TopMotion(Section):
 
 
 @dataclass(frozen=True)
-class Load(Section):
+class Load(SceneTable):
     """A row of [[tables.environment]]: force and moment on the vessel at its centre of gravity, in the frame of [tables]."""
 
     time: float = _number("instant", "s")

@@ -24,7 +24,7 @@ from typing import Any
 
 from master.coupling.ledger import Columns
 from master.fmi.schema import build
-from master.scene.sections import Coupling, Section, Simulation, _number
+from master.scene.sections import Coupling, SceneTable, Simulation, _number
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Unit:
 
 
 @dataclass(frozen=True)
-class PairOfPorts(Section):
+class PairOfPorts(SceneTable):
     """A row of bond.pairs, see `master.coupling.bond.Pair`."""
 
     effort: str

@@ -27,8 +27,8 @@ _ROUNDS = 25
 
 
 @dataclass(frozen=True)
-class Moment:
-    """Both states at an instant, and the mean pull [N, N m] on the pipe's top and mean velocity over the step that led there."""
+class Instant:
+    """Both states at one time, and the mean pull [N, N m] on the pipe's top and mean velocity over the step that led there."""
 
     time: float
     pipe: PipeState
@@ -38,8 +38,8 @@ class Moment:
     pipe_solves: int
 
 
-def march(scene: Scene, macro_step: float | None = None, duration: float | None = None) -> tuple[Pipe, Vessel, Iterator[Moment]]:
-    """The two models of a scene and an iterator over its moments, the start included.
+def march(scene: Scene, macro_step: float | None = None, duration: float | None = None) -> tuple[Pipe, Vessel, Iterator[Instant]]:
+    """The two models of a scene and an iterator over its instants, the start included.
 
     Raises UsageError for a scene the units refuse; the iterator raises RunError where a step does not converge.
     """
@@ -49,12 +49,12 @@ def march(scene: Scene, macro_step: float | None = None, duration: float | None 
     pipe, vessel = Pipe(at.pipe), Vessel(at.vessel)
     simulation = scene.sections.simulation
     h, end = macro_step or simulation.macro_step, duration or simulation.duration
-    return pipe, vessel, _moments(scene, pipe, vessel, h, round(end / h))
+    return pipe, vessel, _instants(scene, pipe, vessel, h, round(end / h))
 
 
-def _moments(scene: Scene, pipe: Pipe, vessel: Vessel, h: float, steps: int) -> Iterator[Moment]:
+def _instants(scene: Scene, pipe: Pipe, vessel: Vessel, h: float, steps: int) -> Iterator[Instant]:
     found, state = pipe.start(0.0)
-    now = Moment(0.0, state, vessel.start(), found.top, np.zeros(6), 0)
+    now = Instant(0.0, state, vessel.start(), found.top, np.zeros(6), 0)
     before = now.velocity
     yield now
     tables = scene.sections.tables
@@ -65,8 +65,8 @@ def _moments(scene: Scene, pipe: Pipe, vessel: Vessel, h: float, steps: int) -> 
         yield now
 
 
-def _step(pipe: Pipe, vessel: Vessel, now: Moment, guess: np.ndarray, time: float, h: float, load: dict[str, np.ndarray]) -> Moment:
-    """The moment h [s] later. Raises RunError."""
+def _step(pipe: Pipe, vessel: Vessel, now: Instant, guess: np.ndarray, time: float, h: float, load: dict[str, np.ndarray]) -> Instant:
+    """The instant h [s] later. Raises RunError."""
     velocity, error = guess, np.inf
     for rounds in range(1, _ROUNDS + 1):
         piped = pipe.step(now.pipe._replace(time=time), velocity[:3], velocity[3:], h)
@@ -78,6 +78,6 @@ def _step(pipe: Pipe, vessel: Vessel, now: Moment, guess: np.ndarray, time: floa
         error = float(np.abs(gap).max())
         given = float((np.abs(moved.state.mobility) @ np.abs(piped.top)).max())
         if error <= _TOLERANCE * float(np.abs(velocity).max()) + _ROUND_OFF * given:
-            return Moment(time + h, piped.state, moved.state, piped.top, velocity, rounds)
+            return Instant(time + h, piped.state, moved.state, piped.top, velocity, rounds)
         velocity = velocity + np.linalg.solve(np.eye(6) + moved.state.mobility @ piped.impedance, gap)
     raise RunError(f"monolithic step of {h:g} s at t = {time:g} s: no agreement after {_ROUNDS} rounds, velocity gap {error:.1e}")

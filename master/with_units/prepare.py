@@ -1,7 +1,7 @@
 """The process that prepares a run: checks the scene's units, finds the equilibrium, writes the FMUs.
 
-Reads the scene as JSON from standard input; `--export DIR` writes pipe.fmu and vessel.fmu there, with `--portable` ones that bring their
-Python, else they go to a cache by content. Prints one JSON object: fmus; or error and exit.
+Reads the scene as JSON from standard input; `--export DIR` writes pipe.fmu and vessel.fmu there, for all platforms, else they go to a cache
+by content, for this one; with `--python` they are run by Python instead of being machine code. Prints JSON: fmus; or error, exit.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from typing import Any
 
 from master.errors import RunError, UsageError, broken_arithmetic
 from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
+from master.fmi.native.export import native_fmu
+from master.fmi.native.machine import PLATFORMS, own_platform
 from master.fmi.runtime import end_with_reader
 from master.fmi.schema import to_mapping
 from master.fmi.stand_in import let_stand_in
@@ -30,12 +32,13 @@ _BOND = {  # unit of measure -> the vessel's ports of what pipe and vessel excha
 }  # fmt: skip
 
 
-def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False) -> dict[str, Any]:
+def prepare(mapping: dict[str, Any], folder: Path | None, by_python: bool = False) -> dict[str, Any]:
     """FMU files of a scene, which start in its equilibrium. Raises UsageError, RunError."""
     scene = from_mapping(mapping, "scene")
     folders, compile_kernels = let_stand_in(PACKAGES)
     from master.with_units import statics  # of the packages that now stand in
     from pipe_fmu.slave import PipeUnit
+    from vessel_fmu.slave import VesselUnit
 
     with broken_arithmetic("parameters"):
         statics.parameters(scene)  # refused before the kernels take their minute
@@ -57,15 +60,22 @@ def prepare(mapping: dict[str, Any], folder: Path | None, portable: bool = False
             to_mapping(parameters),
             experiment=experiment,
             inputs=held.get(name, {}),
-            portable=portable,
             nominal=shared.get(name, {}),
         )
         for name, parameters in units.items()
     }
-    fmus = {
-        name: cached_fmu(recipe, cache_folder("fmus")) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
-        for name, recipe in recipes.items()
-    }
+    if by_python:
+        fmus = {
+            name: cached_fmu(recipe, cache_folder("fmus")) if folder is None else build_fmu(recipe, folder / f"{name}.fmu")
+            for name, recipe in recipes.items()
+        }
+    else:
+        classes: dict[str, type[Any]] = {"pipe": PipeUnit, "vessel": VesselUnit}
+        platforms = (own_platform(),) if folder is None else PLATFORMS
+        fmus = {
+            name: native_fmu(recipe, classes[name], platforms, None if folder is None else folder / f"{name}.fmu")
+            for name, recipe in recipes.items()
+        }
     return {"fmus": {name: str(path) for name, path in fmus.items()}}
 
 
@@ -74,7 +84,7 @@ def main(arguments: list[str]) -> None:
     end_with_reader(sys.stdout.fileno())
     folder = Path(arguments[1]) if arguments[:1] == ["--export"] else None
     try:
-        answer = prepare(json.load(sys.stdin), folder, "--portable" in arguments[2:])
+        answer = prepare(json.load(sys.stdin), folder, "--python" in arguments)
     except (UsageError, RunError) as error:
         answer = {"error": str(error), "exit": 2 if isinstance(error, UsageError) else 1}
     except OSError as error:  # a full disk

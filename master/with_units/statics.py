@@ -22,8 +22,9 @@ from master.scene.reading import DEFAULTS, Scene
 from pipe_fmu import Pipe, PipeParameters, resolve, validity
 from pipe_fmu.environment import Environment
 from pipe_fmu.statics.solve import Equilibrium
-from vessel_fmu import validity as vessel_validity
-from vessel_fmu.parameters import Start, VesselParameters, set_point
+from vessel_fmu import native
+from vessel_fmu.dp_controller import set_point
+from vessel_fmu.parameters import Start, VesselParameters, values
 from vessel_fmu.vessel import Vessel
 
 T = TypeVar("T")
@@ -129,9 +130,9 @@ def remarks(at: Prepared) -> list[str]:
     pipe = Pipe(at.pipe)
     state = pipe.at_rest(at.found)
     used = pipe.utilisation(state, pipe.section_forces(state))
-    found = [*validity.of_parameters(at.pipe), *validity.look(pipe, validity.limits(pipe), state, used, validity.QUIET)[0]]
+    found = [*validity.of_parameters(at.pipe), *pipe.remarks(state, used)]
     if at.vessel is not None:
-        found += [*vessel_validity.of_parameters(at.vessel), *vessel_validity.look(Vessel(at.vessel).start(), vessel_validity.QUIET)[0]]
+        found += native.started(at.vessel)[1]
     return list(dict.fromkeys(found))
 
 
@@ -175,7 +176,7 @@ def _floating(scene: Scene, pipe_parameters: PipeParameters, parameters: VesselP
         rest = relative * Rotation.from_euler("y", -angle)
         posed = replace(posed, departure_angle=angle, departure_rotation=_three(rest.as_rotvec()))
     if posed.controller is not None:
-        x, y, yaw = set_point(posed)
+        x, y, yaw = set_point(values(posed)).tolist()
         posed = replace(posed, controller=replace(posed.controller, x=x, y=y, yaw=yaw))
     hold = _without_noise((-force[0], -force[1], -moment[2]))
     posed = _replaced("vessel", posed, hold_force=_three(hold))

@@ -5,7 +5,6 @@ A load that is added gets a module, a field of `Loads` and a line in each functi
 the modules' `LEDGER`. Every function takes what all loads may need, and calls them in one order.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ..arrays import Array, distinct
@@ -34,21 +33,20 @@ class Loads(NamedTuple):
     bed: Bed
 
 
-
 def present(parameters: Any) -> dict[str, bool]:
     """Whether the parameters name the physics behind a port of the ledger, of those that may be absent."""
     return dict.fromkeys(bed.LEDGER, parameters.seabed is not None)
 
 
-def loads_of(parameters: Any, section: Callable[[Callable[[Any], object]], Array], bearing: Array) -> Loads:
-    """Loads of every element; `section` lists a property of the section of each, `bearing` (n - 1,) the weights that lie at z = 0."""
-    diameter = section(lambda one: one.hydrodynamic_diameter)
-    factor = 0.5 * parameters.environment.water_density * diameter[:, None]
-    return Loads(
-        weight=section(parameters.weight),
-        drag=factor * section(lambda one: (one.drag_tangential, one.drag_normal)),
-        bed=bed.bed_of(parameters.seabed, bearing, diameter),
-    )
+@inner
+def fill_loads(loads, e, weight, bearing, diameter, water_density, tangential, normal):
+    """Fill in the loads on element e: its submerged weight per length [N/m] and that which lies at z = 0, the diameter over its coating
+    [m], and its coefficients of drag.
+    """
+    loads.weight[e] = weight
+    loads.drag[e, 0], loads.drag[e, 1] = 0.5 * water_density * diameter * tangential, 0.5 * water_density * diameter * normal
+    if bed.present(loads.bed):
+        loads.bed.bearing[e], loads.bed.diameter[e] = bearing, diameter
 
 
 @kernel

@@ -13,8 +13,6 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from ..arrays import Array, distinct
 from ..checks import check_fields, number
 from ..compiled import inner, kernel
@@ -54,14 +52,6 @@ class Bed(NamedTuple):
     damping: float  # [s/m]
     friction: float  # [-]
     friction_speed: float  # [m/s]
-
-
-
-def bed_of(seabed: Seabed | None, bearing: Array, diameter: Array) -> Bed:
-    """The bed under elements that lie with `bearing` (n - 1,) and `diameter` (n - 1,), or none."""
-    if seabed is None:
-        return Bed(np.zeros(0), np.zeros(0), 0.0, 0.0, 1.0)
-    return Bed(bearing, diameter, float(seabed.damping), float(seabed.friction), float(seabed.friction_speed))
 
 
 @kernel

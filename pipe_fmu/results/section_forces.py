@@ -57,11 +57,11 @@ class MassPerLength(NamedTuple):
 
 def largest_bending_moment(s: Array, forces: SectionForces) -> float:
     """Largest bending moment [N m] along the line, between the nodes `s` (n,) too."""
-    return math.sqrt(_largest_square(s, forces.moment, forces.shear))
+    return math.sqrt(largest_bending_square(s, forces.moment, forces.shear))
 
 
 @inner
-def _largest_square(s, moment, shear):
+def largest_bending_square(s, moment, shear):
     largest = 0.0
     for e in range(s.shape[0] - 1):
         for k in range(SAMPLES + 1):
@@ -202,6 +202,10 @@ def _tighten(tension, h, stiffness, rows, plain, ends):
     _add(ends, 9, apply(r, (0.0, two[1] + two[0], three[1] + three[0])))
 
 
-def centreline_length(line_length: Array, strain: Array) -> float:
+@inner
+def centreline_length(line_length, strain):
     """Length of the stretched centreline, the integral of |d phi / d S| [m]."""
-    return float(line_length @ (1.0 + strain[:, 0]))
+    total = 0.0
+    for e in range(line_length.shape[0]):
+        total += line_length[e] * (1.0 + strain[e, 0])
+    return total

@@ -7,10 +7,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..compiled import inner
-from ..parameters import PipeParameters
 from .section_forces import SAMPLES, SectionForces, bending_square
-
-_AT_JOINT = 1e-9  # m; so near to the end of a section a node stands at its joint
 
 
 class Wall(NamedTuple):
@@ -27,39 +24,19 @@ class Wall(NamedTuple):
     yield_stress: Array  # Pa, infinite where it is not given
 
 
-def walls(parameters: PipeParameters, s: Array) -> tuple[Wall, Wall]:
-    """Walls below and above the nodes `s` (n,): two at a joint of sections, elsewhere the same."""
-    return _wall(parameters, s - _AT_JOINT), _wall(parameters, s + _AT_JOINT)
-
-
-def element_walls(parameters: PipeParameters, s: Array) -> Wall:
-    """Walls of the elements between the nodes `s` (n,), (n - 1,) each: those of the section that their middle lies in."""
-    return _wall(parameters, 0.5 * (s[1:] + s[:-1]))
-
-
-def _wall(parameters: PipeParameters, s: Array) -> Wall:
-    environment = parameters.environment
-    ends = np.cumsum([section.length or parameters.length for section in parameters.all_sections])
-    at = [parameters.all_sections[min(int(np.searchsorted(ends, x)), len(ends) - 1)] for x in s]
-    columns = [
-        (
-            one.steel_area if one.wall_thickness is not None else 0.0,
-            one.second_moment,
-            *one.radii,
-            one.outer_area,
-            one.contents_density * environment.gravity,
-            math.inf if one.yield_stress is None else one.yield_stress,
-        )
-        for one in at
-    ]
-    *arrays, yields = np.array(columns).T.copy()
-    return Wall._make([*arrays, environment.water_density * environment.gravity, environment.depth, yields])
+@inner
+def fill_wall(wall, i, shape, thickness, contents, yield_stress):
+    """Fill in a section's wall at place i; contents [N/m3]; thickness and yield stress are NaN where they are not given."""
+    wall.area[i] = 0.0 if math.isnan(thickness) else shape.steel_area
+    wall.second_moment[i], wall.inner[i], wall.outer[i] = shape.second_moment, shape.inner, shape.outer
+    wall.displaced[i], wall.contents[i] = shape.outer_area, contents
+    wall.yield_stress[i] = math.inf if math.isnan(yield_stress) else yield_stress
 
 
 def wall_tension(wall: Wall, position: Array, forces: SectionForces) -> Array:
     """Force (n,) [N] in `wall`: effective tension - p_e A_e + p_i A_i. Nodes of sections without a wall have the effective tension."""
     out = np.empty(len(wall.area))
-    _wall_tension(wall, position, forces.tension, out)
+    fill_wall_tension(wall, position, forces.tension, out)
     return out
 
 
@@ -89,7 +66,7 @@ def _in_wall(wall, i, tension, outside, inside):
 
 
 @inner
-def _wall_tension(wall, position, tension, out):
+def fill_wall_tension(wall, position, tension, out):
     for i in range(out.shape[0]):
         outside, inside = _pressures(wall, position[i, 2], i)
         out[i] = _in_wall(wall, i, tension[i], outside, inside) if wall.area[i] > 0.0 else tension[i]
@@ -101,7 +78,7 @@ def largest_von_mises(wall: Wall, s: Array, position: Array, forces: SectionForc
     `wall` is that of the elements. Between nodes the bending moment is that of section_forces.bending_square; tension, torque and depth
     are linear.
     """
-    stress, utilisation = _largest(wall, s, position, forces)
+    stress, utilisation = largest_stress(wall, s, position, forces)
     return float(stress), float(utilisation)
 
 
@@ -113,7 +90,7 @@ def _von_mises(wall, position, tension, moment, out):
 
 
 @inner
-def _largest(wall, s, position, forces):
+def largest_stress(wall, s, position, forces):
     largest, used, tension, moment = 0.0, 0.0, forces.tension, forces.moment
     for e in range(s.shape[0] - 1):
         for k in range(SAMPLES + 1):

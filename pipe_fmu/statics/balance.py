@@ -1,5 +1,6 @@
 """A line at rest with its top held: forces, potential and tangent at a pose, and the corrections that follow from them."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..line import Line, Water
 from ..maths.block_tridiagonal import condense, factorize, substitute
 from ..maths.so3 import exp, multiply, normalize
 from ..simd.columns import attitude
-from .stability import positive
+from .stability import definite
 from .system import static_system
 
 Pose = tuple[Array, Array]  # positions (n, 3) [m], attitudes (n, 4)
@@ -21,13 +22,12 @@ Pose = tuple[Array, Array]  # positions (n, 3) [m], attitudes (n, 4)
 _ROUND_OFF = 1e-12  # of the sum of absolute potentials
 _NEUTRAL = 1e-6  # of the weight over the length: about the stiffness of a hanging line
 _EPSILON = float(np.finfo(float).eps)
-_TANGENT = 16.0 * _EPSILON  # of a node's largest stiffness: what its tangent is known to
 _NEAREST = 8  # eigenvalues looked at
 _KRYLOV = 80  # vectors they are found with
 
 
 @kernel
-def _turn(quaternion, x, out):
+def turn(quaternion, x, out):
     """Attitudes after the spins of x (n, 6)."""
     for i in range(x.shape[0]):
         turned = normalize(multiply(exp((x[i, 3], x[i, 4], x[i, 5])), attitude(quaternion.T, i)))
@@ -38,12 +38,12 @@ def _turn(quaternion, x, out):
 def moved(pose: Pose, move: Array) -> Pose:
     """Positions and attitudes after the displacements and spins (n, 6)."""
     turned = np.empty_like(pose[1])
-    _turn(pose[1], move, turned)
+    turn(pose[1], move, turned)
     return pose[0] + move[:, :3], turned
 
 
 class Scales:
-    """What a line is measured by: `force`, its weight [N]; `arm` (6,), by which that is multiplied, the longest element for moments;
+    """What a line is measured by: `force`, its weight [N]; `longest`, its longest element [m], which moments are measured over;
     `metric` (n, 6), each node's share of the weight by its length [N] (times that length squared over twelve); `neutral` [1/m]: of the
     metric, stiffness that counts as none; `rounding` [N]: force that a last digit of the position of the top makes in the stiffest element.
 
@@ -51,13 +51,72 @@ class Scales:
     """
 
     def __init__(self, line: Line) -> None:
-        length = float(line.length.sum())
-        self.force = max(float(np.abs(line.loads.weight * line.length).sum()), float(line.stiffness[:, 4:].min()) / length**2)
-        self.arm = np.array([1.0] * 3 + [float(line.length.max())] * 3)
-        node = 0.5 * (np.append(line.length, 0.0) + np.append(0.0, line.length))
-        self.metric = self.force / length * np.column_stack([node] * 3 + [node**3 / 12.0] * 3)
-        self.neutral = _NEUTRAL / length
-        self.rounding = _EPSILON * length * float((line.stiffness[:, 0] / line.length).max())
+        self.force, self.longest, self.neutral, self.rounding, self.metric = measures(line)
+
+
+@kernel
+def measures(line):
+    """Force [N], longest element [m], neutral stiffness [1/m], rounding [N] and metric (n, 6) [N] of a line's Scales."""
+    n, length, longest, weight, soft, stiff = line.mass.shape[0], 0.0, 0.0, 0.0, math.inf, 0.0
+    for e in range(n - 1):
+        h = line.length[e]
+        length, longest = length + h, max(longest, h)
+        weight += math.fabs(line.loads.weight[e] * h)
+        soft = min(soft, line.stiffness[e, 4], line.stiffness[e, 5])
+        stiff = max(stiff, line.stiffness[e, 0] / h)
+    force = max(weight, soft / (length * length))
+    metric = np.empty((n, 6))
+    for i in range(n):
+        node = 0.5 * ((line.length[i] if i < n - 1 else 0.0) + (line.length[i - 1] if i > 0 else 0.0))
+        for k in range(3):
+            metric[i, k], metric[i, 3 + k] = force / length * node, force / length * node * node * node / 12.0
+    return force, longest, _NEUTRAL / length, _EPSILON * length * stiff, metric
+
+
+@kernel
+def hold(line, quaternion, vector):
+    """Strike what acts on the held ends from forces (n, 6)."""
+    hold_foot(line, quaternion, vector[0])
+    for i in range(6 if line.top_clamped else 3):
+        vector[-1, i] = 0.0
+
+
+@kernel
+def unbalance(residual, top, foot, force, longest):
+    """Largest residual (moments over the longest element) over the weight `force` [N] or the force at an end, whichever is largest; the
+    node it is at, and that force.
+    """
+    for end in (top, foot):
+        force = max(force, math.sqrt(end[0] * end[0] + end[1] * end[1] + end[2] * end[2]))
+    largest, worst = 0.0, 0
+    for i in range(residual.shape[0]):
+        for k in range(6):
+            left = math.fabs(residual[i, k]) / (1.0 if k < 3 else longest)
+            if not left <= largest:
+                largest, worst = left, i
+                if math.isnan(left):
+                    return left, i, force
+    return largest / force, worst, force
+
+
+@kernel
+def correction(line, factors, residual, x):
+    """Fill in the displacements and spins x (n, 6) that undo a residual (n, 6), to first order, by the `factors` of the tangent."""
+    diagonal, lower, upper = factors
+    right, at_top = residual.copy(), np.empty(6)
+    condense(lower, right)
+    top_correction(line, diagonal[-1], right[-1], np.zeros(6), at_top)
+    substitute(diagonal, upper, right, at_top, x)
+
+
+@kernel
+def limited(move, turn):
+    """Displacements and spins (n, 6), reduced so that no section turns by more than `turn` [rad]; not finite if they are not."""
+    largest = 0.0
+    for i in range(move.shape[0]):
+        for k in range(3, 6):
+            largest = max(largest, math.fabs(move[i, k]))
+    return (turn / largest if largest > turn else 1.0) * move
 
 
 class Balance:
@@ -77,10 +136,8 @@ class Balance:
         self.potential, self.blur = sum(parts), _ROUND_OFF * sum(abs(part) for part in parts)
         self.top, self.foot = self.residual[-1].copy(), self.residual[0].copy()
         self.hold(self.residual)
-        force = max(scales.force, *(float(np.linalg.norm(end[:3])) for end in (self.top, self.foot)))
-        left = np.abs(self.residual) / scales.arm
-        self.worst = int(left.max(axis=1).argmax())
-        self.size, self.rounding = float(left.max()) / force, scales.rounding / force
+        self.size, self.worst, force = unbalance(self.residual, self.top, self.foot, scales.force, scales.longest)
+        self.rounding = scales.rounding / force
 
     def after(self, move: Array) -> "Balance":
         """The balance after the displacements and spins (n, 6)."""
@@ -88,8 +145,7 @@ class Balance:
 
     def hold(self, vector: Array) -> None:
         """Strike what acts on the held ends from forces (n, 6)."""
-        hold_foot(self.line, self.pose[1], vector[0])
-        vector[-1, : 6 if self.line.top_clamped else 3] = 0.0
+        hold(self.line, self.pose[1], vector)
 
     def flaw(self) -> str:
         """What an element is in a pose that is no configuration of a line; empty if it is one."""
@@ -108,9 +164,8 @@ class Balance:
 
     def definite(self, damping: float = 0.0) -> bool:
         """Whether the symmetric part of the tangent, with `damping` [1/m] times the metric, is positive definite."""
-        known = _TANGENT * np.abs(self.tangent[0]).reshape(-1, 2, 3, 6).max(axis=(2, 3))  # of forces, of moments
-        added = (self.scales.neutral + damping) * self.scales.metric + np.repeat(known, 3, axis=1)
-        return positive(self.line, self.pose[1], self.tangent, added)
+        stiffness = self.scales.neutral + damping
+        return bool(definite(self.line, self.pose[1], self.tangent, self.scales.metric, stiffness))
 
     def _attracting(self) -> bool:
         factors = Factors(self, self.scales.neutral)
@@ -149,10 +204,8 @@ class Factors:
 
     def correction(self, residual: Array) -> Array:
         """Displacements and spins (n, 6) that undo a residual (n, 6), to first order."""
-        right, at_top, x = residual.copy(), np.empty(6), np.empty_like(residual)
-        condense(self.lower, right)
-        top_correction(self.line, self.diagonal[-1], right[-1], np.zeros(6), at_top)
-        substitute(self.diagonal, self.upper, right, at_top, x)
+        x = np.empty_like(residual)
+        correction(self.line, (self.diagonal, self.lower, self.upper), residual, x)
         return x
 
     def stiffness(self) -> Array:
@@ -180,9 +233,3 @@ def _largest_eigenvalues(operator: Callable[[Array], Array], start: Array) -> ND
         projected[k + 1, k], basis[k + 1] = left, new / left
     found = np.linalg.eigvals(projected[:count, :count]).astype(complex)
     return found[np.argsort(-np.abs(found))[:_NEAREST]]
-
-
-def limited(move: Array, turn: float) -> Array:
-    """Displacements and spins (n, 6), reduced so that no section turns by more than `turn` [rad]; not finite if they are not."""
-    largest = float(np.abs(move[:, 3:]).max())
-    return move * (turn / largest) if largest > turn else move

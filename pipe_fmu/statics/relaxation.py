@@ -18,15 +18,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
+from ..compiled import kernel
 from .balance import Balance, Factors, limited
 
 TOLERANCE = 1e-11  # of the line's weight or largest end force (times its longest element, for moments)
 ROUND_OFF = 1e-7  # accepted once the residual no longer falls,
 _COARSEST = 1e-5  # and where the line is so stiff that its round-off is larger, that up to here
 LOST = 1e12  # residual from which there is no way back
-_CORRECTIONS = 60  # of Newton's method
+CORRECTIONS = 60  # of Newton's method
 DESCENTS = 1000
-_TURN = 0.25  # rad of one correction
+TURN = 0.25  # rad of one correction
 _INNER = 6  # corrections of one step of a descent
 _SHARE = 0.1  # of the promised energy that a step must release
 _LEAST_DAMPING = 1e-7  # 1/m
@@ -50,18 +51,18 @@ def relax(start: Balance, descents: int) -> Rest:
 
 
 def newton(balance: Balance) -> Rest:
-    """Equilibrium by Newton's method, sections turned by at most _TURN in a correction; it may be an unstable one, or none."""
+    """Equilibrium by Newton's method, sections turned by at most TURN in a correction; it may be an unstable one, or none."""
     best, iteration = math.inf, 0
-    for iteration in range(_CORRECTIONS):
+    for iteration in range(CORRECTIONS):
         if not balance.size < LOST:
             break
-        if _resting(balance, best):
+        if settled(balance.size, balance.rounding, best):
             return _rest(balance, balance.stable(), iteration)
         best = min(best, balance.size)
         factors = Factors(balance, 0.0)
         if not factors.regular:
             break
-        balance = balance.after(limited(factors.correction(balance.residual), _TURN))
+        balance = balance.after(limited(factors.correction(balance.residual), TURN))
     return Rest(balance, False, False, iteration)
 
 
@@ -71,20 +72,24 @@ def _rest(balance: Balance, stable: bool, iteration: int) -> Rest:
     return Rest(balance, sound, sound and stable, iteration)
 
 
-def _resting(balance: Balance, best: float) -> bool:
-    return balance.size <= TOLERANCE or (balance.size <= _round_off(balance) and balance.size > 0.3 * best)
+@kernel
+def settled(size, rounding, best):
+    """Whether a residual is as small as it gets: `rounding` is what round-off makes of it, `best` the smallest before."""
+    return size <= TOLERANCE or (size <= round_off(rounding) and size > 0.3 * best)
 
 
-def _round_off(balance: Balance) -> float:
-    return max(ROUND_OFF, min(balance.rounding, _COARSEST))
+@kernel
+def round_off(rounding):
+    """Residual that is accepted once it no longer falls."""
+    return max(ROUND_OFF, min(rounding, _COARSEST))
 
 
 def descend(balance: Balance, limit: int) -> Rest:
     """Stable equilibrium by descent from a pose, in at most `limit` steps."""
-    damping, turn, best, iteration = 0.0, _TURN, math.inf, 0
+    damping, turn, best, iteration = 0.0, TURN, math.inf, 0
     for iteration in range(limit):
         definite = balance.definite()
-        if _resting(balance, best) and (definite or balance.stable()):
+        if settled(balance.size, balance.rounding, best) and (definite or balance.stable()):
             return _rest(balance, True, iteration)
         best = min(best, balance.size)
         if not definite:
@@ -100,8 +105,8 @@ def descend(balance: Balance, limit: int) -> Rest:
         balance = after
         if ratio > 0.5:
             damping = 0.25 * damping if damping > 4.0 * _LEAST_DAMPING else 0.0
-        turn = min(2.0 * turn, _TURN)
-    return _rest(balance, False, iteration) if balance.size <= _round_off(balance) else Rest(balance, False, False, iteration)
+        turn = min(2.0 * turn, TURN)
+    return _rest(balance, False, iteration) if balance.size <= round_off(balance.rounding) else Rest(balance, False, False, iteration)
 
 
 def _step(balance: Balance, damping: float, turn: float, definite: bool) -> tuple[Balance | None, float]:
@@ -109,7 +114,7 @@ def _step(balance: Balance, damping: float, turn: float, definite: bool) -> tupl
     factors = Factors(balance, damping)
     if not factors.regular:
         return None, 0.0
-    move = limited(factors.correction(balance.residual), _TURN)
+    move = limited(factors.correction(balance.residual), TURN)
     anchored = True
     if not definite:
         move = limited(move, turn)
@@ -126,7 +131,7 @@ def _step(balance: Balance, damping: float, turn: float, definite: bool) -> tupl
         released = balance.potential - there.potential + work
         if abs(released) < balance.blur:  # only the forces tell
             released = -0.5 * float(((balance.residual + there.residual) * (way + move)).sum())
-        if released > _SHARE * promised or (definite and there.size < 0.5 * balance.size and there.size < _round_off(there)):
+        if released > _SHARE * promised or (definite and there.size < 0.5 * balance.size and there.size < round_off(there.rounding)):
             return there, released / promised
         here, way = there, way + move if anchored else way
         anchored = True
@@ -135,7 +140,7 @@ def _step(balance: Balance, damping: float, turn: float, definite: bool) -> tupl
             break
         right = here.residual + damping * here.scales.metric * way
         here.hold(right)
-        move = limited(factors.correction(right), _TURN)
+        move = limited(factors.correction(right), TURN)
     return None, 0.0
 
 

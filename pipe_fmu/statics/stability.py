@@ -7,39 +7,89 @@ import math
 
 import numpy as np
 
-from ..arrays import Array
 from ..compiled import kernel
-from ..line import Line
+from ..element.ends import axis_of_foot
 from ..maths.block_tridiagonal import SIZE
-from ..maths.so3 import matrix
+
+_TANGENT = 16.0 * float(np.finfo(float).eps)  # of a node's largest stiffness: what its tangent is known to
 
 
-def positive(line: Line, quaternion: Array, blocks: tuple[Array, Array, Array], added: Array) -> bool:
+@kernel
+def definite(line, quaternion, blocks, metric, stiffness):
+    """Whether the symmetric part of the tangent, with `stiffness` [1/m] times the metric (n, 6) and its round-off, is positive definite."""
+    added = np.empty(metric.shape)
+    for i in range(metric.shape[0]):
+        for first in (0, 3):  # forces, moments
+            known = 0.0
+            for j in range(first, first + 3):
+                for k in range(SIZE):
+                    known = max(known, math.fabs(blocks[0][i, j, k]))
+            for j in range(first, first + 3):
+                added[i, j] = stiffness * metric[i, j] + _TANGENT * known
+    return positive(line, quaternion, blocks, added)
+
+
+@kernel
+def positive(line, quaternion, blocks, added):
     """Whether the symmetric part of the tangent `blocks` (n, 6, 6), (n - 1, 6, 6) x 2 of free ends is positive definite once they are held.
 
     quaternion (n, 4); added (n, 6): stiffness [N/m, N m] added to the diagonal.
     """
     diagonal, lower, upper = blocks
-    block = 0.5 * (diagonal + diagonal.transpose(0, 2, 1))
-    side = 0.5 * (upper + lower.transpose(0, 2, 1))
-    block[:, range(SIZE), range(SIZE)] += added
-    for node, free in ((0, _foot(line, quaternion)), (-1, _top(line))):
-        block[node] = free @ block[node] @ free + np.eye(SIZE) - free
-        side[node] = free @ side[node] if node == 0 else side[node] @ free
-    return bool(_cholesky(block, side))
-
-
-def _foot(line: Line, quaternion: Array) -> Array:
-    """Projector (6, 6) on the free motions of the foot: none, or a pinned foot's turning but about t1."""
-    out = np.zeros((SIZE, SIZE))
+    n = diagonal.shape[0]
+    block, side, free = np.empty((n, SIZE, SIZE)), np.empty((n - 1, SIZE, SIZE)), np.zeros((SIZE, SIZE))
+    for k in range(n):
+        for i in range(SIZE):
+            for j in range(SIZE):
+                block[k, i, j] = 0.5 * (diagonal[k, i, j] + diagonal[k, j, i])
+                if k < n - 1:
+                    side[k, i, j] = 0.5 * (upper[k, i, j] + lower[k, j, i])
+            block[k, i, i] += added[k, i]
     if not line.foot_clamped:
-        axis = np.array(matrix(tuple(quaternion[0])))[:, 0]
-        out[3:, 3:] = np.eye(3) - np.outer(axis, axis)
+        _turning(axis_of_foot(quaternion), free)
+    _hold(free, block[0])
+    _put(_product(free, side[0]), side[0])
+    _turning((0.0, 0.0, 0.0), free)
+    if line.top_clamped:
+        free[:] = 0.0
+    _hold(free, block[n - 1])
+    _put(_product(side[n - 2], free), side[n - 2])
+    return _cholesky(block, side)
+
+
+@kernel
+def _turning(axis, free):
+    """Fill in the projector (6, 6) on turning about all axes but one (none, if that is zero)."""
+    for i in range(3):
+        for j in range(3):
+            free[3 + i, 3 + j] = (1.0 if i == j else 0.0) - axis[i] * axis[j]
+
+
+@kernel
+def _hold(free, block):
+    """Let a block act on the free motions, of which `free` is the projector, and be one on the others."""
+    inside = _product(free, _product(block, free))
+    for i in range(SIZE):
+        for j in range(SIZE):
+            block[i, j] = inside[i, j] + (1.0 if i == j else 0.0) - free[i, j]
+
+
+@kernel
+def _product(a, b):
+    """Product of two blocks (6, 6)."""
+    out = np.zeros((SIZE, SIZE))
+    for i in range(SIZE):
+        for k in range(SIZE):
+            for j in range(SIZE):
+                out[i, j] += a[i, k] * b[k, j]
     return out
 
 
-def _top(line: Line) -> Array:
-    return np.diag([0.0] * 3 + [0.0 if line.top_clamped else 1.0] * 3)
+@kernel
+def _put(block, out):
+    for i in range(SIZE):
+        for j in range(SIZE):
+            out[i, j] = block[i, j]
 
 
 @kernel

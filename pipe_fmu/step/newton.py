@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..compiled import inner, kernel
+from ..compiled import inlined, inner, kernel
 from ..element.ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
 from ..element.strains import STRAINS, growth
 from ..line import line_columns
@@ -101,7 +101,7 @@ def _made(line, old, x, residual, force, works):
     return math.fabs(made) / (EXCHANGED * exchanged + STORED * stored + _NOTHING)
 
 
-@kernel
+@inlined
 def solve_step(line, water, state, velocity, spin, h, mobility, weights, damped):
     """One step from a guess of its mean velocities: the sum of those of the last three steps times `weights`.
 
@@ -162,7 +162,7 @@ def _advanced(line, h, state, old, new, x, force, works):
     return PipeState(state.time + h, *moved, last, state.last, state.before, top_work, works)
 
 
-@kernel
+@inlined
 def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scratch):
     """Increments x (n, 6) of one step, from a guess of them; the line and the old state come in columns (simd/columns.py).
 
@@ -214,12 +214,14 @@ def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scra
         if done and iteration > 0:
             return True, iteration, size
         if made < least:
-            least, best[:] = made, x
+            least = made
+            _copy(x, best)
         if settled:
             patience -= 1 if size > 0.9 * lowest_settled else 0
             lowest_settled = min(size, lowest_settled)
         if least < math.inf and (patience == 0 or lost or iteration == limit):
-            x[:], with_tangent, last = best, n == 0, True
+            _copy(best, x)
+            with_tangent, last = n == 0, True
             continue
         if damped and not settled and iteration > 1 and share > LEAST_SHARE and not size * force_scale < lowest:
             share *= 0.5
@@ -256,6 +258,14 @@ def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scra
                 x[n - 1, i] = top[i]
         previous = size
     return False, limit, size
+
+
+@inner
+def _copy(a, b):
+    """b = a (n, 6); a slice assignment would bring the making of messages along."""
+    for k in range(a.shape[0]):
+        for i in range(SIZE):
+            b[k, i] = a[k, i]
 
 
 @inner

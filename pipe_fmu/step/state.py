@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from .. import loads
 from ..arrays import Array, distinct
+from ..compiled import kernel
 
 LEDGER = {  # ports of energies and works: what they are, and the least they can be
     "kinetic_energy": ("kinetic energy", 0.0),
@@ -36,3 +37,12 @@ class PipeState(NamedTuple):
     earlier: Array  # (n, 6) and of the one before that
     top_work: float  # work done on the pipe at its top since the start [J]
     works: Array  # (len(WORKS),) works and dissipations since the start [J], in their order
+
+
+@kernel
+def timed(state, time):
+    """The state, taken for that at `time` [s]."""
+    return PipeState(
+        time, state.position, state.quaternion, state.velocity, state.rate, state.added_mass_velocity, state.strain,
+        state.chord, state.last, state.before, state.earlier, state.top_work, state.works,
+    )  # fmt: skip

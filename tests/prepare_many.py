@@ -1,0 +1,11 @@
+"""Prepares many scenes in one process: mappings as a JSON list from standard input; prints, for each, its FMUs in machine code and by
+Python."""
+
+import json
+import sys
+
+from master.with_units.prepare import prepare
+
+if __name__ == "__main__":
+    scenes = json.load(sys.stdin)
+    json.dump([[prepare(scene, None)["fmus"], prepare(scene, None, by_python=True)["fmus"]] for scene in scenes], sys.stdout)
