@@ -1,8 +1,8 @@
 /* Between face.c and the unit's kernels, which numba has compiled: their way of taking arrays, and what they need of numba's runtime.
 
    The constants begin with the sizes of all vectors, which the kernels take from their arrays, and with the numbers of the messages that an
-   unchanged unit has for its start, beside what the kernels say. Kernels for two kinds of processor may be
-   there, of which the better one that this processor is of is taken. A kernel that fails where it cannot, without memory, gives an error. */
+   unchanged unit has for its start, beside what the kernels say. Step and outputs may be there for two kinds of processor, of which the
+   better one that this processor is of is taken. A kernel that fails where it cannot, without memory, gives an error. */
 #include "face.h"
 
 #include <stdlib.h>
@@ -54,15 +54,16 @@ enum { N_CONSTANTS, N_STATE, N_INPUTS, N_OUTPUTS, N_PARAMETERS, FIRST_REMARK, N_
 #define SIZED(c, vector, which) GIVE(vector, (int64_t)(c)[which])
 #define NOTES GIVE(notes, N_NOTES)
 
-#define KERNELS(level) \
-    int32_t kernel_constants_##level(int64_t *, void **, ARRAY, ARRAY, ARRAY, ARRAY); \
-    int32_t kernel_start_##level(int64_t *, void **, ARRAY, ARRAY, ARRAY, ARRAY, double, ARRAY, ARRAY); \
+int32_t kernel_constants_base(int64_t *, void **, ARRAY, ARRAY, ARRAY, ARRAY);
+int32_t kernel_start_base(int64_t *, void **, ARRAY, ARRAY, ARRAY, ARRAY, double, ARRAY, ARRAY);
+
+#define FAST(level) \
     int32_t kernel_step_##level(int64_t *, void **, ARRAY, ARRAY, double, double, ARRAY, ARRAY, ARRAY); \
     int32_t kernel_outputs_##level(int64_t *, void **, ARRAY, ARRAY, int64_t, ARRAY);
 
-KERNELS(base)
+FAST(base)
 #ifdef LEVELS
-KERNELS(v3)
+FAST(v3)
 #include <cpuid.h>
 #include <stdatomic.h>
 
@@ -89,8 +90,8 @@ static int has_v3(void) {
 int64_t unit_constants(const double *exported, const double *parameters, double *constants, double *notes) {
     int64_t status = ERROR;
     void *failure = NULL;
-    int done = !CALL(constants, &status, &failure, CONSTANTS(exported), SIZED(exported, parameters, N_PARAMETERS),
-                     GIVE(constants + N_SIZES, (int64_t)exported[N_CONSTANTS] - N_SIZES), NOTES);
+    int done = !kernel_constants_base(&status, &failure, CONSTANTS(exported), SIZED(exported, parameters, N_PARAMETERS),
+                                      GIVE(constants + N_SIZES, (int64_t)exported[N_CONSTANTS] - N_SIZES), NOTES);
     return done ? status : ERROR;
 }
 
@@ -112,8 +113,8 @@ int64_t unit_start(const double *constants, const double *exported, const double
                    double *notes) {
     int64_t status = ERROR;
     void *failure = NULL;
-    int done = !CALL(start, &status, &failure, CONSTANTS(constants), CONSTANTS(exported), SIZED(constants, exported_state, N_STATE),
-                     SIZED(constants, inputs, N_INPUTS), time, SIZED(constants, state, N_STATE), NOTES);
+    int done = !kernel_start_base(&status, &failure, CONSTANTS(constants), CONSTANTS(exported), SIZED(constants, exported_state, N_STATE),
+                                  SIZED(constants, inputs, N_INPUTS), time, SIZED(constants, state, N_STATE), NOTES);
     if (done && status == OK && equal(constants, exported, (int64_t)exported[N_CONSTANTS])) add_remarks(constants, notes);
     return done ? status : ERROR;
 }

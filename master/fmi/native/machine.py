@@ -26,6 +26,7 @@ from . import windows, zig
 HERE = Path(__file__).parent
 SOURCES = ("face.c", "unit.c", "kernels.c", "face.h", "windows.c", "windows.py")
 KERNELS = ("constants", "start", "step", "outputs")
+FAST = ("step", "outputs")  # those that are there for the better kind of processor too
 _MATH = "sqrt|hypot|pow|fmod|floor|exp|expm1|log|log10|a?(sin|cos|tan)h?|atan2|sincos"
 NEEDED = re.compile(rf"NRT_\w+|numba_attempt_nocopy_reshape|release_reference|llvm\..*|mem(cpy|set|move)|{_MATH}")
 FLAGS = ("-std=c11", "-O2", "-fvisibility=hidden", "-shared", "-s", "-ffp-contract=off")
@@ -80,11 +81,15 @@ class Machine:
             module = binding.parse_bitcode(library._get_module_for_linking().as_bitcode())
             for function in module.functions:
                 if not function.is_declaration:
-                    function.linkage = "external" if function.name in self._names else "internal"
+                    function.add_function_attribute("nounwind")  # no tables to unwind it by
+                    function.linkage = "external" if function.name in self._names else "linkonce_odr"  # one of each
             if whole is None:
                 whole = module
             else:
                 whole.link_in(module)
+        for value in (*whole.functions, *whole.global_variables):
+            if not value.is_declaration and value.name not in self._names:
+                value.linkage = "internal"
         text = re.sub(rf"declare [^\n]*@{re.escape(_RELEASE)}\([^\n]*", "declare i8 @release_reference(ptr, i64, i32)", str(whole))
         return text.replace(f"@{_RELEASE}", "@release_reference")
 
@@ -97,7 +102,10 @@ class Machine:
         text = re.sub(r'target triple = "[^"]*"', f'target triple = "{platform.triple}"', self._text)
         module = binding.parse_assembly(re.sub(r'target datalayout = "[^"]*"', f'target datalayout = "{machine.target_data}"', text))
         for name, kernel in self._names.items():
-            module.get_function(name).name = f"kernel_{kernel}_{level}"
+            if level == "base" or kernel in FAST:
+                module.get_function(name).name = f"kernel_{kernel}_{level}"
+            else:
+                module.get_function(name).linkage = "internal"
         builder = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
         passes = binding.create_new_module_pass_manager()
         passes.add_global_dead_code_eliminate_pass()
@@ -110,7 +118,7 @@ class Machine:
 def library(machine: Callable[[], Machine], platform: Platform, name: str, key: str, folder: Path) -> bytes:
     """The shared library of a unit for a platform, kept in `folder` by the hash `key` of its package. Raises RunError."""
     facts = repr((key, platform, FLAGS, numba.__version__, llvmlite.__version__)).encode()
-    facts += b"".join((HERE / source).read_bytes() for source in SOURCES)
+    facts += b"".join((HERE / source).read_bytes() for source in (*SOURCES, "machine.py"))
     place = folder / f"{name}_{platform.folder}_{hashlib.sha256(facts).hexdigest()[:12]}.z"
     try:
         return zlib.decompress(place.read_bytes())
