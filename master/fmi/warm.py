@@ -1,11 +1,13 @@
 """Starts the unit of an unpacked FMU, so that numba compiles and keeps its kernels: ``warm.py RESOURCES STEP`` (s)."""
 
+import gc
 import runpy
 import sys
 
 
 def main(resources: str, step: float) -> None:
     """Through initialisation, one step, and a look at every output. Raises what goes wrong."""
+    gc.disable()  # the compiler makes much, and little of it is ever free
     runtime = runpy.run_path(f"{resources}/runtime.py")
     runtime["end_with_reader"](sys.stdout.fileno())
     slave = runtime["load"](resources).__self__.slave_class(instance_name="warm", resources=resources, visible=False)
