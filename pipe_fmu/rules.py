@@ -5,7 +5,7 @@ import math
 MOST_STRETCH = 0.05  # mean strain up to which a line may be stretched: the law (20) is that of small strains
 SUBSTEPS = (1, 3, 9, 27, 81, 243, 729)
 WORDS = (  # templates, and how many of the values they take
-    ("max_substeps = %d: must be one of " + ", ".join(map(str, SUBSTEPS)), 1),
+    ("max_substeps = %g: must be one of " + ", ".join(map(str, SUBSTEPS)), 1),
     (
         f"length = %g: must be at least %.6g m, or the line is stretched by more than {100.0 * MOST_STRETCH:g}%% "
         "to the distance from foot to top, %.6g m",

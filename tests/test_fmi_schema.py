@@ -63,7 +63,7 @@ def test_flat_names_units_and_ranges():
     flat = schema.flatten(schema.build(Line, FULL))
     assert flat["top[2]"] == schema.Parameter("Real", 2.5, "m")
     assert flat["nodes"] == schema.Parameter("Integer", 24, "", 2, 500)
-    assert flat["length"] == schema.Parameter("Real", 1200.0, "m", 0.0, None, "unstretched")
+    assert flat["length"] == schema.Parameter("Real", 1200.0, "m", 0.0, None, "unstretched", above=True)
     assert flat["bed.friction"].value == 1 / 3
     assert flat["quiet"].kind == "Boolean"
     assert flat["foot"] == schema.Parameter("Enumeration", "pinned", items=("clamped", "pinned"))

@@ -28,7 +28,7 @@ UNITS = ("pipe", "vessel")
 GLIBC = ("libc.so.6", "libm.so.6", "libdl.so.2", "libpthread.so.0", "librt.so.1", "libutil.so.1")
 ALL = [
     "pipe.added_mass={}", "pipe.seabed={friction=0.5}", "pipe.internal_damping=0.01", "pipe.numerical_damping=0.05",
-    "pipe.section.yield_stress=450e6", "pipe.section.contents_density=800", "pipe.max_substeps=9", "start.z=-800", "start.x=840",
+    "pipe.section.yield_stress=450e6", "pipe.section.contents_density=800", "pipe.max_substeps=9", "start.x=840",
 ]  # fmt: skip
 SNAP = ["top_motion.amplitude=[0.0, 0.0, 6.0]", "top_motion.period=8.0"]
 
@@ -86,11 +86,26 @@ def shaken(fmus, unit, k):
             fmu.set(name, value)
 
 
-def agree(one, other, port, what):
-    ours, theirs = one.get(port), other.get(port)
-    size = np.abs(theirs).max()
-    tolerance = LOOSE.get(port, 1e-9) * size if size > 0.0 else 1e-9
-    assert np.abs(ours - theirs).max() <= max(tolerance, 1e-9 * (1.0 if port.startswith("end_moment") else 0.0)), f"{port} {what}"
+class Scales:
+    """What differences are measured by: the largest value that a port has had, and, for those that are zero but for round-off, the last
+    digits of the largest value of all ports of its unit of measure.
+    """
+
+    def __init__(self):
+        self.ports, self.units = {}, {}
+
+    def allowed(self, port, value):
+        size = float(np.abs(value).max())
+        largest = self.ports[port.name] = max(size, self.ports.get(port.name, 0.0))
+        of_unit = self.units[port.unit] = max(size, self.units.get(port.unit, 0.0))
+        return LOOSE.get(port.name, 1e-9) * largest + 1e-12 * of_unit
+
+
+def agree(one, other, names, scales, what):
+    for _ in range(2):  # the scales first
+        allowed = {name: scales.allowed(other.port(name), other.get(name)) for name in names}
+    for name in names:
+        assert np.abs(one.get(name) - other.get(name)).max() <= allowed[name], f"{name} {what}"
 
 
 @pytest.fixture(scope="module")
@@ -107,14 +122,13 @@ def test_call_by_call_it_is_the_fmu_run_by_python(name, both_kinds):
     native, python = both_kinds[name]
     for unit in native:
         with Fmu(native[unit]) as ours, Fmu(python[unit]) as theirs:
-            both = ours, theirs
+            both, scales = (ours, theirs), Scales()
             assert ours.ports.keys() == theirs.ports.keys()
             for fmu in both:
                 fmu.initialize()
             assert ours.remark == theirs.remark
             for k in range(25):
-                for port in theirs.names("output"):
-                    agree(ours, theirs, port, f"of {unit} at step {k}")
+                agree(ours, theirs, theirs.names("output"), scales, f"of {unit} at step {k}")
                 shaken(both, unit, k)
                 for fmu in both:
                     fmu.step(0.1 * k, 0.1)
@@ -168,12 +182,12 @@ def test_a_fixed_parameter_is_refused_by_name_and_a_free_one_acts(unit):
         fmu.initialize({"configuration": "{}"})
     if unit == "vessel":
         with Fmu(path) as fmu, Fmu(path) as plain:
-            fmu.initialize({"controller.surge_limit": 2e5, "environment.depth": 800.0})
+            fmu.initialize({"controller.surge_limit": 4e5, "environment.depth": 800.0})
             plain.initialize()
             for k in range(400):
                 for one in (fmu, plain):
                     one.step(0.1 * k, 0.1)
-            assert abs(fmu.get("thrust")[0]) <= 2e5 < abs(plain.get("thrust")[0])
+            assert abs(fmu.get("thrust")[0]) <= 4e5 < abs(plain.get("thrust")[0])
         with Fmu(path) as fmu, pytest.raises(FmuFailed, match=r"controller.period = 0: must be > 0 s"):
             fmu.initialize({"controller.period": 0.0})
 

@@ -197,10 +197,10 @@ def test_sag_is_the_rise_of_the_arc_above_its_chord():
 def test_chord_stiffness_is_that_of_a_timoshenko_bar_with_linear_moment():
     """Cantilever of one element under a tip force: deflection L^3 / 3 EI + L / GA, slope L^2 / 2 EI (Timoshenko)."""
     bending, shear, force = 8.0e4, 3.0e5, 1e-3
-    k, p = shear_stiffness(np.array([shear]), np.array([bending]), np.array([LENGTH]))
-    share = np.array([p[0], p[0]])
+    k, p = shear_stiffness(shear, bending, LENGTH)
+    share = np.array([p, p])
     rows = gradients(np.array([1.0, 0, 0, 0]), np.array([1.0, 0, 0, 0]), np.array([LENGTH, 0, 0]), share)
-    moduli = np.array([1e9, k[0], k[0], 5e4, bending, bending])
+    moduli = np.array([1e9, k, k, 5e4, bending, bending])
     wide = np.empty((element.STRAINS, 12))
     for row, out in zip(rows, wide, strict=False):
         assembly.expand(row, out)

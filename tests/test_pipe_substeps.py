@@ -87,10 +87,7 @@ def test_partial_success_leaves_nothing_behind():
     """Parts that were done before one failed are gone: the state is as it was, bit for bit."""
     pipe, _, start = started(heave_case(nodes=12))
     kept = [np.array(part, copy=True) for part in start]
-    for velocity in (60.0, 80.0, 100.0):  # the line is taut after some of the parts
-        result, parts, _ = divided(pipe, start, [0.0, 0.0, -velocity], np.zeros(3), 3.0, 27)
-        if not result.converged and parts > 0:
-            break
+    result, parts, _ = divided(pipe, start, [0.0, 0.0, -80.0], np.zeros(3), 1.0, 27)  # the line is taut after some of the parts
     assert not result.converged
     assert parts > 0
     assert all(np.array_equal(a, b) for a, b in zip(kept, result.state, strict=True))

@@ -190,9 +190,9 @@ class UnitSlave(Fmi2Slave):
         for vr, value in zip(vrs, values, strict=True):
             causality, name, _ = self.ports.place(vr, kind)
             if causality == "output":
-                raise Refused(f"{name} = {value}: an output cannot be set")
+                raise Refused(f"{self.ports.scalar(vr)} = {value}: an output cannot be set")
             if self.phase == "terminated":
-                raise Refused(f"{name} = {value}: the FMU is terminated")
+                raise Refused(f"{self.ports.scalar(vr)} = {value}: the FMU is terminated")
             if causality == "input":
                 inputs[vr] = value
             elif self.phase == "initialised":

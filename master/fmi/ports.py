@@ -78,8 +78,14 @@ class Ports:
         causality, name, _ = place = self._places[reference]
         own = self.parameters[name].kind if causality == "parameter" else "Integer" if name in self.counts else "Real"
         if kind != ("Integer" if own == "Enumeration" else own) and not (causality == "output" and kind == "Real"):
-            raise ValueError(f"{name}: asked for as {kind}, is {own}")
+            raise ValueError(f"{self.scalar(reference)}: asked for as {kind}, is {own}")
         return place
+
+    def scalar(self, reference: int) -> str:
+        """Name of the variable at a value reference: that of the port, with its index where there are several."""
+        causality, name, i = self._places[reference]
+        size = {"input": self.inputs, "output": self.outputs}[causality][name][0] if causality != "parameter" else 1
+        return scalar_names(name, size)[i]
 
     def check_parameter(self, name: str, value: Any) -> None:
         """Raise ValueError where `value` cannot be that of the parameter `name`; its range is the unit's business."""
@@ -126,8 +132,7 @@ class Ports:
         if finite(inputs):
             return None
         bad = next(i for i, value in enumerate(inputs) if not math.isfinite(value))
-        _, name, i = self.place(bad)
-        return f"{name}[{i + 1}] = {inputs[bad]}: must be finite"
+        return f"{self.scalar(bad)} = {inputs[bad]}: must be finite"
 
     def variables(self, ranges: Ranges, nominal: Mapping[str, float]) -> list[Variable]:
         """Scalar variables for the model description, by value reference; `nominal` values by port or unit of measure."""

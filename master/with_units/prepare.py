@@ -15,6 +15,7 @@ from typing import Any
 
 from master.errors import RunError, UsageError, broken_arithmetic
 from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
+from master.fmi.native.ahead import made_ahead
 from master.fmi.native.export import native_fmu
 from master.fmi.native.machine import PLATFORMS, own_platform
 from master.fmi.runtime import end_with_reader
@@ -35,7 +36,8 @@ _BOND = {  # unit of measure -> the vessel's ports of what pipe and vessel excha
 def prepare(mapping: dict[str, Any], folder: Path | None, by_python: bool = False) -> dict[str, Any]:
     """FMU files of a scene, which start in its equilibrium. Raises UsageError, RunError."""
     scene = from_mapping(mapping, "scene")
-    folders, compile_kernels = let_stand_in(PACKAGES)
+    platforms = (own_platform(),) if folder is None else PLATFORMS
+    folders, compile_kernels = let_stand_in(PACKAGES) if by_python else made_ahead(PACKAGES, platforms)
     from master.with_units import statics  # of the packages that now stand in
     from pipe_fmu.slave import PipeUnit
     from vessel_fmu.slave import VesselUnit
@@ -71,7 +73,6 @@ def prepare(mapping: dict[str, Any], folder: Path | None, by_python: bool = Fals
         }
     else:
         classes: dict[str, type[Any]] = {"pipe": PipeUnit, "vessel": VesselUnit}
-        platforms = (own_platform(),) if folder is None else PLATFORMS
         fmus = {
             name: native_fmu(recipe, classes[name], platforms, None if folder is None else folder / f"{name}.fmu")
             for name, recipe in recipes.items()

@@ -43,9 +43,8 @@ def native_fmu(recipe: Recipe, unit_class: type[Any], platforms: Sequence[Platfo
     if destination is None and cache.used(place) and zipfile.is_zipfile(place):
         return place
     unit = unit_class(schema.build(unit_class.PARAMETERS, recipe.parameters))
-    unit.compile()
-    native = importlib.import_module(f"{unit_class.__module__.rpartition('.')[0]}.native")
-    machine = functools.cache(functools.partial(Machine, native))  # made when a library is not kept
+    native = kernels_of(unit)
+    machine = functools.cache(lambda: machine_of(unit))  # made when a library is not kept
     libraries = {p: library(machine, p, recipe.name, recipe.bundle, cache_folder("libraries")) for p in platforms}
     files = {f"binaries/{p.folder}/{recipe.name}.{p.ending}": made for p, made in libraries.items()}
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -55,6 +54,17 @@ def native_fmu(recipe: Recipe, unit_class: type[Any], platforms: Sequence[Platfo
     if destination is None:
         cache.bound()
     return place
+
+
+def kernels_of(unit: Any) -> ModuleType:
+    """The module `native` of a unit's package."""
+    return importlib.import_module(f"{type(unit).__module__.rpartition('.')[0]}.native")
+
+
+def machine_of(unit: Any) -> Machine:
+    """The compiled kernels of a unit."""
+    unit.compile()
+    return Machine(kernels_of(unit))
 
 
 def _digest(recipe: Recipe, platforms: Sequence[Platform]) -> str:

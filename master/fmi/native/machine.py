@@ -76,7 +76,7 @@ class Machine:
 
     def _joined(self, libraries: Iterable[Any]) -> str:
         """The intermediate code of all kernels in one module, of which only they can be called from outside."""
-        whole = None
+        whole: Any = None
         for library in libraries:
             module = binding.parse_bitcode(library._get_module_for_linking().as_bitcode())
             for function in module.functions:
@@ -115,11 +115,16 @@ class Machine:
         return bytes(machine.emit_object(module))
 
 
-def library(machine: Callable[[], Machine], platform: Platform, name: str, key: str, folder: Path) -> bytes:
-    """The shared library of a unit for a platform, kept in `folder` by the hash `key` of its package. Raises RunError."""
+def kept(platform: Platform, name: str, key: str, folder: Path) -> Path:
+    """Where the library of a unit for a platform is kept in `folder`, by the hash `key` of its package."""
     facts = repr((key, platform, FLAGS, numba.__version__, llvmlite.__version__)).encode()
     facts += b"".join((HERE / source).read_bytes() for source in (*SOURCES, "machine.py"))
-    place = folder / f"{name}_{platform.folder}_{hashlib.sha256(facts).hexdigest()[:12]}.z"
+    return folder / f"{name}_{platform.folder}_{hashlib.sha256(facts).hexdigest()[:12]}.z"
+
+
+def library(machine: Callable[[], Machine], platform: Platform, name: str, key: str, folder: Path) -> bytes:
+    """The shared library of a unit for a platform, made if it is not `kept`. Raises RunError."""
+    place = kept(platform, name, key, folder)
     try:
         return zlib.decompress(place.read_bytes())
     except (OSError, zlib.error):  # not there, or not whole
