@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 from face_fuzz import Unit
-from toy_face import OK, Toy, library
+from toy_face import ERROR, OK, Toy, library
 
 HERE = Path(__file__).parent
 UNITS = ("pipe", "vessel")
@@ -75,6 +75,19 @@ def test_random_calls_find_no_fault(unit, kind, unpacked):
     calls, steps = map(int, done.stdout.split())
     assert calls > 20_000
     assert steps > 500
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_the_data_of_another_version_or_unit_are_refused_in_one_line(unit, unpacked, tmp_path):
+    made, resources = unpacked("plain", unit)
+    guid, words = Unit.described(Path(resources).parent).guid, "of another version or unit than the library; take both from one FMU"
+    data = Path(resources, "unit.bin").read_bytes()
+    other = Path(unpacked("plain", next(it for it in UNITS if it != unit))[1], "unit.bin").read_bytes()
+    for foreign in (data[:16] + bytes(8) + data[24:], other):
+        (tmp_path / "unit.bin").write_bytes(foreign)
+        it = Toy(library(made), str(tmp_path), guid)
+        assert not it.handle
+        assert it.log == [(ERROR, "logStatusError", f"resources: {tmp_path}/unit.bin: {words}")]
 
 
 def trajectory(lib, resources, unit, seed):

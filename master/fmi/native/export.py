@@ -26,7 +26,7 @@ from ..cache import cache_folder
 from ..description import Variable
 from ..document import icon_png, page_html
 from ..ports import Ports
-from .machine import HERE, SOURCES, Machine, Platform, library
+from .machine import HERE, SOURCES, Machine, Platform, kinship, library
 from .tables import Row, unit_file
 
 _SIZES = 7  # numbers before a unit's constants, see kernels.c
@@ -96,14 +96,14 @@ def _described(recipe: Recipe, unit: Any, native: ModuleType, digest: str) -> di
         "modelDescription.xml": ElementTree.tostring(model, "utf-8", xml_declaration=True),
         "documentation/index.html": page.encode(),
         "model.png": icon_png(),
-        "resources/unit.bin": unit_data(recipe.name, guid, slave, unit, native),
+        "resources/unit.bin": unit_data(recipe, guid, slave, unit, native),
         **licenses.entry(recipe.name, recipe.license, recipe.author),
         **licenses.of_package("pipelay"),
         **licenses.of_package("numba"),
     }
 
 
-def unit_data(name: str, guid: str, slave: UnitSlave, unit: Any, native: ModuleType) -> bytes:
+def unit_data(recipe: Recipe, guid: str, slave: UnitSlave, unit: Any, native: ModuleType) -> bytes:
     """The content of unit.bin: see tables.py."""
     ports: Ports = slave.ports
     held = ports.held(ports.start)
@@ -126,10 +126,11 @@ def unit_data(name: str, guid: str, slave: UnitSlave, unit: Any, native: ModuleT
     remarks = [line.replace("%", "%%") for line in unit.remark.splitlines() if line not in _said_by_kernels(unit, native)]
     sizes = [_SIZES + len(unit.constants), len(unit.state), len(ports.start), n_outputs, len(numbers), len(native.MESSAGES), len(remarks)]
     return unit_file(
-        name,
+        recipe.name,
         guid,
         rows,
         [*native.MESSAGES, *remarks],
+        kernels=kinship(recipe.bundle),
         constants=np.concatenate([np.array(sizes, dtype=float), unit.constants]),
         state=unit.state,
         inputs=ports.start,

@@ -25,6 +25,7 @@ from . import windows, zig
 
 HERE = Path(__file__).parent
 SOURCES = ("face.c", "unit.c", "kernels.c", "face.h", "windows.c", "windows.py")
+LAYOUT = ("unit.c", "kernels.c", "face.h", "tables.py", "export.py")  # what writes and reads the data of a unit
 KERNELS = ("constants", "start", "step", "outputs")
 FAST = ("step", "outputs")  # those that are there for the better kind of processor too
 _MATH = "sqrt|hypot|pow|fmod|floor|exp|expm1|log|log10|a?(sin|cos|tan)h?|atan2|sincos"
@@ -76,7 +77,7 @@ class Machine:
 
     def _joined(self, libraries: Iterable[Any]) -> str:
         """The intermediate code of all kernels in one module, of which only they can be called from outside."""
-        whole = None
+        whole: Any = None
         for library in libraries:
             module = binding.parse_bitcode(library._get_module_for_linking().as_bitcode())
             for function in module.functions:
@@ -115,9 +116,17 @@ class Machine:
         return bytes(machine.emit_object(module))
 
 
+def kinship(key: str) -> int:
+    """A number that a unit's library and its data have in common: of its package, whose hash is `key`, and of the layout of the data."""
+    digest = hashlib.sha256(key.encode())
+    for source in LAYOUT:
+        digest.update((HERE / source).read_bytes())
+    return int.from_bytes(digest.digest()[:8], "little")
+
+
 def library(machine: Callable[[], Machine], platform: Platform, name: str, key: str, folder: Path) -> bytes:
     """The shared library of a unit for a platform, kept in `folder` by the hash `key` of its package. Raises RunError."""
-    facts = repr((key, platform, FLAGS, numba.__version__, llvmlite.__version__)).encode()
+    facts = repr((kinship(key), platform, FLAGS, numba.__version__, llvmlite.__version__)).encode()
     facts += b"".join((HERE / source).read_bytes() for source in (*SOURCES, "machine.py"))
     place = folder / f"{name}_{platform.folder}_{hashlib.sha256(facts).hexdigest()[:12]}.z"
     try:
@@ -130,7 +139,7 @@ def library(machine: Callable[[], Machine], platform: Platform, name: str, key: 
             objects.append(Path(work, f"{level}.o"))
             objects[-1].write_bytes(machine().object_file(platform, level))
         made, packed = Path(work, f"unit.{platform.ending}"), Path(work, "packed")
-        link(platform, objects, made, folder)
+        link(platform, objects, made, folder, f"-DKERNELS={kinship(key)}u")
         packed.write_bytes(zlib.compress(made.read_bytes()))
         packed.replace(place)
         return made.read_bytes()
