@@ -1,13 +1,15 @@
 """Starts the unit of an unpacked FMU, so that numba compiles and keeps its kernels: ``warm.py RESOURCES STEP`` (s)."""
 
 import runpy
+import select
 import sys
 
 
 def main(resources: str, step: float) -> None:
     """Through initialisation, one step, and a look at every output. Raises what goes wrong."""
     runtime = runpy.run_path(f"{resources}/runtime.py")
-    runtime["end_with_reader"](sys.stdout.fileno())
+    if hasattr(select, "poll"):  # not on Windows
+        runtime["end_with_reader"](sys.stdout.fileno())
     slave = runtime["load"](resources).__self__.slave_class(instance_name="warm", resources=resources, visible=False)
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()

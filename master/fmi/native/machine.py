@@ -92,7 +92,7 @@ class Machine:
             if not value.is_declaration and value.name not in self._names:
                 value.linkage = "internal"
         text = re.sub(rf"declare [^\n]*@{re.escape(_RELEASE)}\([^\n]*", "declare i8 @release_reference(ptr, i64, i32)", str(whole))
-        return text.replace(f"@{_RELEASE}", "@release_reference")
+        return text.replace(f"@{_RELEASE}", "@release_reference").replace("@_hypot(", "@hypot(")  # its name on Windows
 
     def object_file(self, platform: Platform, level: str) -> bytes:
         """Object file for a platform and a level of its processors. Raises RunError where the kernels need what is not there."""
