@@ -48,7 +48,8 @@ from toy_face import (
 
 from master.fmi.native.tables import Row, checksum, unit_file
 
-TARGETS = {"x86_64-windows-gnu": b"MZ", "x86_64-macos": b"\xcf\xfa\xed\xfe", "aarch64-linux-gnu.2.17": b"\x7fELF"}
+MACH = b"\xcf\xfa\xed\xfe"
+TARGETS = {"x86_64-windows-gnu": b"MZ", "x86_64-macos": MACH, "aarch64-macos": MACH, "aarch64-linux-gnu.2.17": b"\x7fELF"}
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from ..cache import cache_folder
 from ..description import Variable
 from ..document import icon_png, page_html
 from ..ports import Ports
-from .machine import HERE, SOURCES, Machine, Platform, kinship, library
+from .machine import HERE, SOURCES, Machine, Platform, joined, kinship, library
 from .tables import Row, unit_file
 
 _SIZES = 7  # numbers before a unit's constants, see kernels.c
@@ -46,10 +46,13 @@ def native_fmu(recipe: Recipe, unit_class: type[Any], platforms: Sequence[Platfo
     unit.compile()
     native = importlib.import_module(f"{unit_class.__module__.rpartition('.')[0]}.native")
     machine = functools.cache(functools.partial(Machine, native))  # made when a library is not kept
-    libraries = {p: library(machine, p, recipe.name, recipe.bundle, cache_folder("libraries")) for p in platforms}
-    files = {f"binaries/{p.folder}/{recipe.name}.{p.ending}": made for p, made in libraries.items()}
+    libraries: dict[str, list[bytes]] = {}
+    for platform in platforms:
+        made = library(machine, platform, recipe.name, recipe.bundle, cache_folder("libraries"))
+        libraries.setdefault(f"binaries/{platform.folder}/{recipe.name}.{platform.ending}", []).append(made)
     place.parent.mkdir(parents=True, exist_ok=True)
     finished = place.with_name(f".{os.getpid()}_{place.name}")
+    files = {name: joined(parts) for name, parts in libraries.items()}
     _write(finished, files | _described(recipe, unit, native, _digest(recipe, platforms)))
     finished.replace(place)
     if destination is None:

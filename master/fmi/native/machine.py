@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import struct
 import tempfile
 import zlib
 from collections.abc import Callable, Iterable, Sequence
@@ -31,6 +32,7 @@ FAST = ("step", "outputs")  # those that are there for the better kind of proces
 _MATH = "sqrt|hypot|pow|fmod|floor|exp|expm1|log|log10|a?(sin|cos|tan)h?|atan2|sincos"
 NEEDED = re.compile(rf"NRT_\w+|numba_attempt_nocopy_reshape|release_reference|llvm\..*|mem(cpy|set|move)|{_MATH}")
 FLAGS = ("-std=c11", "-O2", "-fvisibility=hidden", "-shared", "-s", "-ffp-contract=off")
+_PAGE = 2**14  # bytes, of the processors of macOS
 _RELEASE = "llvm.x86.atomic.sub.cc.i64"  # the one instruction of x86 in numba's code
 
 
@@ -49,7 +51,8 @@ _X86 = (("base", "x86-64-v2"), ("v3", "x86-64-v3"))
 PLATFORMS = (
     Platform("linux64", "so", "x86_64-unknown-linux-gnu", "x86_64-linux-gnu.2.17", _X86),
     Platform("win64", "dll", "x86_64-pc-windows-gnu", "x86_64-windows-gnu", _X86),
-    Platform("darwin64", "dylib", "x86_64-apple-macosx11.0.0", "x86_64-macos", _X86),
+    Platform("darwin64", "dylib", "x86_64-apple-macosx11.0.0", "x86_64-macos", _X86[:1]),
+    Platform("darwin64", "dylib", "arm64-apple-macosx11.0.0", "aarch64-macos", (("base", "apple-m1"),)),  # joined with the one above
 )
 ARM = Platform("aarch64-linux", "so", "aarch64-unknown-linux-gnu", "aarch64-linux-gnu.2.17", (("base", "generic"),))
 
@@ -145,11 +148,25 @@ def library(machine: Callable[[], Machine], platform: Platform, name: str, key: 
         return made.read_bytes()
 
 
+def joined(libraries: Sequence[bytes]) -> bytes:
+    """One library of macOS for several kinds of processor, each in pages of its own behind a table of them; a single one as it is."""
+    if len(libraries) == 1:
+        return libraries[0]
+    table, content = struct.pack(">2I", 0xCAFEBABE, len(libraries)), b""
+    for library in libraries:
+        content += bytes(-len(content) % _PAGE)
+        kind = struct.unpack_from("<2I", library, 4)
+        table += struct.pack(">5I", *kind, _PAGE + len(content), len(library), _PAGE.bit_length() - 1)
+        content += library
+    return table.ljust(_PAGE, b"\0") + content
+
+
 def link(platform: Platform, objects: Sequence[Path], made: Path, folder: Path, *flags: str) -> None:
     """Compile the C face and link it. Raises RunError with the compiler's words where it fails."""
     several = ["-DLEVELS"] if len(objects) > 1 else []
     sources = [str(HERE / source) for source in SOURCES if source.endswith(".c") and source != "windows.c"]
-    end = windows.arguments(made.parent) if platform.ending == "dll" else ["-fPIC", "-lm"]
+    plain = ["-fPIC", "-lm", *(["-Wl,-install_name,unit.dylib"] if platform.ending == "dylib" else [])]  # else that of the folder here
+    end = windows.arguments(made.parent) if platform.ending == "dll" else plain
     files = ["-o", str(made), *sources, *map(str, objects)]
     command = [*zig.COMMAND, "cc", "-target", platform.target, *FLAGS, *several, *flags, *files, *end]
     with locked(folder):
