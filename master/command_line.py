@@ -142,7 +142,7 @@ _COMMANDS = {
     "bench": _Command(
         "Measure CPU time against error, beside other codes; costs of nodes, of physics and of the start.",
         "files written: CASE.csv, and CASE.png where error is measured; all of it takes half an hour",
-        partial(_study_arguments, cases="heave, snap, paper, statics, costs, nodes, start"),
+        partial(_study_arguments, cases="heave, snap, paper, statics, forces, costs, nodes, start"),
     ),
 }
 

@@ -46,7 +46,7 @@ class Judged:
     cosine: float
     errors: tuple[float, float]
     seconds: float
-    unresolved: bool = False  # judged on more nodes, for the usual ones do not resolve its bending
+    unresolved: bool = False  # judged on more nodes, for the usual ones do not resolve its bending or find nothing
 
     @property
     def faults(self) -> list[str]:
@@ -152,9 +152,11 @@ def judge(drawn: Drawn, nodes: int = 48) -> Judged:
 
 
 def settled(drawn: Drawn) -> Judged:
-    """The verdict on 48 nodes, or on four times as many where 48 do not resolve how the line bends, as a hose within a metre."""
+    """The verdict on 48 nodes, or on four times as many where 48 do not resolve how the line bends, as a hose within a metre, or where it
+    is said of them that they find nothing, as of a cable that turns back at its clamped foot.
+    """
     judged = judge(drawn)
-    unresolved = judged.found and judged.errors[0] <= FORCE and not judged.errors[1] <= MOMENT
+    unresolved = not judged.found or not (judged.errors[0] <= FORCE and judged.errors[1] <= MOMENT)
     return replace(judge(drawn, FINER * 47 + 1), unresolved=True) if unresolved else judged
 
 
@@ -201,7 +203,7 @@ def main(count: int, first: int = 0) -> int:
             sys.stdout.write(f"{judged.name}: {'; '.join(remarks)}\n")
             sys.stdout.flush()
     sound = f"{count} lines: {count - faulty} found, stable, not inverted and right, {faulty} not"
-    sound += f" ({unresolved} of them judged on {FINER * 47 + 1} nodes, for 48 do not resolve their bending)"
+    sound += f" ({unresolved} of them judged on {FINER * 47 + 1} nodes, for 48 do not resolve their bending or find nothing)"
     sys.stdout.write(f"{sound}; {np.median(spent):.2f} s each (median), {max(spent):.1f} s at most\n")
     return faulty
 

@@ -1,5 +1,6 @@
 """Starts the unit of an unpacked FMU, so that numba compiles and keeps its kernels: ``warm.py RESOURCES STEP`` (s)."""
 
+import gc
 import runpy
 import select
 import sys
@@ -7,6 +8,7 @@ import sys
 
 def main(resources: str, step: float) -> None:
     """Through initialisation, one step, and a look at every output. Raises what goes wrong."""
+    gc.disable()  # the compiler makes much, and little of it is ever free
     runtime = runpy.run_path(f"{resources}/runtime.py")
     if hasattr(select, "poll"):  # not on Windows
         runtime["end_with_reader"](sys.stdout.fileno())

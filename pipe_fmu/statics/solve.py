@@ -20,6 +20,7 @@ _HAULED_FROM = 0.9  # of the taut distance
 _LONGEST = 1.0 / 8.0  # of the way that the top is led, in one step,
 _SHORTEST = 1.0 / 512.0  # and the step at which the line may fall into another shape
 _FEW = 150  # steps of descent, while the step of the top can be shortened
+_MOST = 10000  # corrections on the whole way, after which no equilibrium is found
 _TURN_OF_END = 0.35  # rad of the section at an end in one step
 _EITHER_WAY = 1e-6  # rad, within which a turn is half a turn
 _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])  # attitude of a clamped foot
@@ -124,10 +125,11 @@ def _led(line: Line, water: Water, scales: Scales, result: Equilibrium, pose: Le
 
     pose: where the line starts from for the part `wanted` of the way, from the equilibrium at the part `reached`.
     """
-    reached, step = 0.0, longest
+    reached, step, left = 0.0, longest, _MOST
     while result.converged and reached < 1.0:
         wanted = min(1.0, reached + step)
-        trial = equilibrium(line, water, scales, pose(result, reached, wanted), _FEW if step > _SHORTEST else DESCENTS)
+        trial = equilibrium(line, water, scales, pose(result, reached, wanted), min(left, _FEW if step > _SHORTEST else DESCENTS))
+        left = max(left - trial.iterations, 0)
         if trial.stable or not result.stable or step <= _SHORTEST:
             reached, result, step = wanted, trial, min(1.5 * step, longest)
         else:
