@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import random
 import sys
+import tempfile
 import time
 from ctypes import byref, c_void_p
 from pathlib import Path
@@ -79,6 +80,7 @@ def fuzz(lib: Any, resources: str, unit: Unit, seconds: float, seed: int) -> tup
             one(dice, unit, it, other, states, now)
             if dice.random() < 0.3 and it.step(now, 0.1) == OK:
                 now, steps = now + 0.1, steps + 1
+        spoiled(dice, lib, resources, unit)
         calls += it.done + other.done
         it.free()
         other.free()
@@ -122,6 +124,17 @@ def one(dice: random.Random, unit: Unit, it: Fuzzed, other: Fuzzed, states: list
             if status == OK:
                 other.call("SetFMUstate", read)
                 other.step(now, 0.1)
+
+
+def spoiled(dice: random.Random, lib: Any, resources: str, unit: Unit) -> None:
+    """An instance of damaged data: there is none, and a word why."""
+    data = bytearray(Path(resources, "unit.bin").read_bytes())
+    data[dice.randrange(len(data))] ^= 1 << dice.randrange(8)
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "unit.bin").write_bytes(data[: dice.choice((len(data), dice.randrange(1, len(data))))])
+        it = Toy(lib, folder, unit.guid)
+    assert not it.handle
+    assert len(it.log) == 1
 
 
 def drawn(dice: random.Random, unit: Unit, among: Any) -> tuple[str, list[int]]:

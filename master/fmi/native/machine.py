@@ -54,7 +54,7 @@ PLATFORMS = (
     Platform("darwin64", "dylib", "x86_64-apple-macosx11.0.0", "x86_64-macos", _X86[:1]),
     Platform("darwin64", "dylib", "arm64-apple-macosx11.0.0", "aarch64-macos", (("base", "apple-m1"),)),  # joined with the one above
 )
-ARM = Platform("aarch64-linux", "so", "aarch64-unknown-linux-gnu", "aarch64-linux-gnu.2.17", (("base", "generic"),))
+ARM = Platform("linux64", "so", "aarch64-unknown-linux-gnu", "aarch64-linux-gnu.2.17", (("base", "generic"),))  # FMI 2 has no name for it
 
 
 def own_platform() -> Platform:
@@ -136,7 +136,7 @@ def library(machine: Callable[[], Machine], platform: Platform, name: str, key: 
         return zlib.decompress(place.read_bytes())
     except (OSError, zlib.error):  # not there, or not whole
         folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder) as work:
+    with tempfile.TemporaryDirectory(dir=folder, ignore_cleanup_errors=True) as work:  # a virus scanner may be at it
         objects = []
         for level, _ in platform.levels:
             objects.append(Path(work, f"{level}.o"))
