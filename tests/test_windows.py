@@ -7,9 +7,11 @@ import ast
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from time import sleep
 
 import pytest
 from windows_like.not_there import MISSING, MODULES
@@ -150,3 +152,23 @@ def test_statics_export_and_run(tmp_path):
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "completed"
     assert "scenes" in like_windows("-m", "master", "--help")
     assert "environment.depth" in like_windows("-m", "master", "keys")
+
+
+@pytest.mark.parametrize(("sign", "status"), [("", None), ("signals.csv", "interrupted")], ids=["while it is prepared", "on its way"])
+def test_ctrl_c_ends_a_run_in_one_line_and_keeps_what_was_computed(sign, status, tmp_path):
+    out, command = tmp_path / "out", [sys.executable, "-P", "-m", "master", "run", "heave", "--set", "simulation.duration=1e5"]
+    environment = os.environ | {"PYTHONPATH": str(HERE / "windows_like")}
+    run = subprocess.Popen([*command, "-o", out], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not (out / sign).exists():
+        assert run.poll() is None
+        sleep(0.05)
+    sleep(0.5)
+    run.send_signal(signal.SIGINT)
+    said, error = run.communicate(timeout=60)
+    assert run.returncode == 1
+    if status is None:
+        assert (said, error) == ("", "pipelay: interrupted\n")
+        assert not out.exists()
+    else:
+        assert error == ""
+        assert json.loads((out / "summary.json").read_text())["status"] == status
