@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,8 @@ def statics(options: argparse.Namespace) -> int:
 
 def export(options: argparse.Namespace) -> int:
     """Write the FMUs of a scene, and the files that connect them, into a folder: all or none, instead of those of another export."""
+    if options.python:
+        _on_linux("--python")
     scene = reading.of_pipe(reading.load(options.scene, options.changes))
     folder = _folder(options.output)
     with taken(folder):
@@ -102,6 +105,7 @@ def keys(options: argparse.Namespace) -> int:
 
 def stability(options: argparse.Namespace) -> int:
     """Run the stability cases; exit code 1 where a limit is not kept."""
+    _on_linux("stability")
     return _study(options, "master.studies.stability.study")
 
 
@@ -126,6 +130,12 @@ def _study(options: argparse.Namespace, module: str) -> int:
         text, kept = cases.study(options.cases, folder, terminal())
     say(f"{text}\ntables in {folder}")
     return 0 if kept else 1
+
+
+def _on_linux(what: str) -> None:
+    """Raise UsageError on other systems."""
+    if sys.platform != "linux":
+        raise UsageError(f"{what}: FMUs that are run by Python are for Linux only; all others are machine code")
 
 
 def _folder(path: Path) -> Path:

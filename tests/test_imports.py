@@ -32,7 +32,7 @@ def imports(path):
     """Absolute names of the modules of this project that a file imports, at any depth of its text."""
     module = [*path.relative_to(ROOT).with_suffix("").parts]
     package = module[:-1]
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -73,7 +73,7 @@ def test_only_named_modules_of_the_master_import_the_units(path):
 
 def named():
     """(equations, file, function) of every place that the concordance names."""
-    for line in (ROOT / ".readme" / "method.md").read_text().splitlines():
+    for line in (ROOT / ".readme" / "method.md").read_text(encoding="utf-8").splitlines():
         cells = [cell.strip() for cell in line.split("|")]
         if len(cells) == 6 and re.match(r"\(\d", cells[1]):
             numbers = [int(n) for n in re.findall(r"\((\d+)\)", cells[1])]
@@ -82,7 +82,7 @@ def named():
 
 @pytest.mark.parametrize(("numbers", "file", "function"), list(named()))
 def test_every_equation_stands_where_the_concordance_says(numbers, file, function):
-    text = (ROOT / file).read_text()
+    text = (ROOT / file).read_text(encoding="utf-8")
     nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == function]
     assert nodes, f"{file} has no {function}"
     body = "\n".join(ast.get_source_segment(text, node) for node in nodes)

@@ -20,6 +20,7 @@ from toy_face import (
     ERROR,
     FORCE,
     GUID,
+    KERNELS,
     KIND,
     LABEL,
     LINUX,
@@ -45,9 +46,10 @@ from toy_face import (
     toy_file,
 )  # fmt: skip
 
-from master.fmi.native.tables import Row, unit_file
+from master.fmi.native.tables import Row, checksum, unit_file
 
-TARGETS = {"x86_64-windows-gnu": b"MZ", "x86_64-macos": b"\xcf\xfa\xed\xfe", "aarch64-linux-gnu.2.17": b"\x7fELF"}
+MACH = b"\xcf\xfa\xed\xfe"
+TARGETS = {"x86_64-windows-gnu": b"MZ", "x86_64-macos": MACH, "aarch64-macos": MACH, "aarch64-linux-gnu.2.17": b"\x7fELF"}
 
 
 @pytest.fixture(scope="module")
@@ -104,32 +106,45 @@ def test_refuses_to_be_made(lib, resources, change, words):
     assert not lib.fmi2Instantiate(None, 0, None, None, None, 0, 0)
 
 
+HEAD = 32  # bytes of unit.bin before what its checksum is of
+OTHER = "of another version or unit than the library; take both from one FMU"
+
+
+def filed(content, kernels=KERNELS):
+    """unit.bin with this content."""
+    return toy_file()[:16] + struct.pack("<QQ", kernels, checksum(content)) + content
+
+
+def test_refuses_the_data_of_another_library(lib, tmp_path):
+    for kernels in (0, KERNELS - 1, KERNELS ^ 1 << 63):
+        (tmp_path / "unit.bin").write_bytes(filed(toy_file()[HEAD:], kernels))
+        it = Toy(lib, str(tmp_path))
+        assert not it.handle
+        assert it.log == [(ERROR, "logStatusError", f"resources: {tmp_path}/unit.bin: {OTHER}")]
+
+
 def test_refuses_other_data(lib, tmp_path):
-    whole = toy_file()
-    rows = len(whole) - 8 * 12 * len(ROWS)
+    whole, lost = toy_file(), "not the data of a unit, or not all of them"
+    content, dice = whole[HEAD:], random.Random(2)
+    damaged = [whole[:place] + bytes([whole[place] ^ 1 << dice.randrange(8)]) + whole[place + 1 :] for place in range(0, len(whole), 7)]
     for data in (
-        b"", whole[:-8], whole[:60], whole + b"\0" * 8, b"P" + whole[1:], whole[:-1] + b"x", b"x" * 4000,
-        whole[:16] + struct.pack("<q", -1) + whole[24:], whole[:16] + struct.pack("<q", 2**62) + whole[24:],
-        whole[:rows] + b"\x7f" * 8 + whole[rows + 8 :],
+        whole[:-8], whole[:60], whole + b"\0" * 8, b"x" * 4000, *damaged,
+        filed(struct.pack("<q", -1) + content[8:]), filed(struct.pack("<q", 2**62) + content[8:]), filed(content[:-1] + b"x"),
     ):  # fmt: skip
         (tmp_path / "unit.bin").write_bytes(data)
         it = Toy(lib, str(tmp_path))
-        if it.handle:  # damage that no table points to
-            it.free()
-            assert data[:16] == whole[:16]
-            assert len(data) == len(whole)
-            continue
-        assert len(it.log) == 1
-        assert it.said.startswith(f"resources: {tmp_path}/unit.bin: ")
+        assert not it.handle
+        of_another = data[:16] == whole[:16] and data[16:24] != whole[16:24]
+        assert it.log == [(ERROR, "logStatusError", f"resources: {tmp_path}/unit.bin: {OTHER if of_another else lost}")]
 
 
 def test_damaged_tables_crash_nothing(lib, tmp_path):
     whole, dice = toy_file(), random.Random(1)
     for _ in range(2000):
-        data = bytearray(whole)
-        place = 104 + 8 * dice.randrange((len(whole) - 104) // 8)
-        data[place : place + 8] = struct.pack("<q", dice.choice((-1, 1, 2**31, 2**63 - 1, dice.randrange(2**40))))
-        (tmp_path / "unit.bin").write_bytes(data)
+        content = bytearray(whole[HEAD:])
+        place = 88 + 8 * dice.randrange((len(content) - 88) // 8)
+        content[place : place + 8] = struct.pack("<q", dice.choice((-1, 1, 2**31, 2**63 - 1, dice.randrange(2**40))))
+        (tmp_path / "unit.bin").write_bytes(filed(content))
         it = Toy(lib, str(tmp_path))
         if it.handle:
             for kind in ("Real", "Integer", "Boolean", "String"):
@@ -496,10 +511,7 @@ def signed(data, place, kind, value):
     """The bytes with a value changed, and the checksum of that."""
     changed = bytearray(data)
     struct.pack_into(kind, changed, place, value)
-    total = 0xCBF29CE484222325
-    for byte in changed[32:]:
-        total = (total ^ byte) * 0x100000001B3 % 2**64
-    struct.pack_into("<Q", changed, 24, total)
+    struct.pack_into("<Q", changed, 24, checksum(changed[32:]))
     return bytes(changed)
 
 
@@ -619,8 +631,9 @@ def test_windows_needs_its_own_libraries_only():
 
 def test_random_calls(resources):
     path = compiled(LINUX, "-fsanitize=undefined", "-fsanitize-trap=undefined")  # ends at the first fault
-    done = subprocess.run([sys.executable, Path(__file__).with_name("face_fuzz.py"), path, resources, "3"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    program = [sys.executable, Path(__file__).with_name("face_fuzz.py"), path, resources, "3", "1"]
+    done = subprocess.run(program, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
     assert int(done.stdout.split()[0]) > 10_000  # calls
 
 
@@ -638,8 +651,8 @@ def test_random_calls(resources):
     ],
 )
 def test_tables_that_do_not_fit(row, words):
-    vectors = {"constants": [], "state": [], "inputs": [], "parameters": [], "n_outputs": 2, "n_groups": 1}
-    assert len(unit_file("x", GUID, [], [], **vectors)) == 104 + 16
+    vectors = {"kernels": 1, "constants": [], "state": [], "inputs": [], "parameters": [], "n_outputs": 2, "n_groups": 1}
+    assert len(unit_file("x", GUID, [], [], **vectors)) == 120 + 16
     with pytest.raises(ValueError, match=words):
         unit_file("x", GUID, [row], [], **vectors)
     with pytest.raises(ValueError, match="guid = "):

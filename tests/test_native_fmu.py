@@ -5,6 +5,7 @@ import json
 import os
 import resource
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -234,6 +235,13 @@ def test_an_export_is_sound_small_and_has_all_platforms(exported, unit):
     title = unit.capitalize()
     assert {f"binaries/linux64/{title}.so", f"binaries/win64/{title}.dll", f"binaries/darwin64/{title}.dylib"} <= set(names)
     assert not any(name.endswith(".py") for name in names)
+    of_macos = zipfile.ZipFile(exported / f"{unit}.fmu").read(f"binaries/darwin64/{title}.dylib")
+    magic, n, *parts = struct.unpack_from(">12I", of_macos)
+    assert (magic, n, parts[::5]) == (0xCAFEBABE, 2, [0x01000007, 0x0100000C])  # x86-64, arm64
+    for kind, _, at, size, _ in (parts[:5], parts[5:]):
+        assert at % 2**14 == 0
+        assert at + size <= len(of_macos)
+        assert struct.unpack_from("<2I", of_macos, at) == (0xFEEDFACF, kind)
     assert any(name.startswith("documentation/licenses/pipelay/") for name in names)
     assert (exported / f"{unit}.fmu").stat().st_size < 2.2e6
     text = zipfile.ZipFile(exported / f"{unit}.fmu").read("documentation/index.html").decode()

@@ -18,7 +18,8 @@ HERE = Path(__file__).parent
 NATIVE = HERE.parent / "master" / "fmi" / "native"
 CACHE = Path(tempfile.gettempdir(), f"pipelay_toy_face_{os.getuid()}")
 SOURCES = [NATIVE / "face.c", NATIVE / "unit.c", HERE / "toy_unit.c"]
-FLAGS = ("-std=c11", "-O2", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror", "-shared", "-s")
+KERNELS = 2**64 - 7
+FLAGS = ("-std=c11", "-O2", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror", "-shared", "-s", f"-DKERNELS={KERNELS}u")
 LINUX = "x86_64-linux-gnu.2.17"
 OK, WARNING, DISCARD, ERROR = range(4)
 GUID = "{toy}"
@@ -58,7 +59,7 @@ MASS_OF, STIFFNESS_OF, START = 2.0, 8.0, (0.25, -1.0)
 def toy_file(rows: Sequence[Row] = ROWS, guid: str = GUID) -> bytes:
     """unit.bin of the toy unit."""
     return unit_file(
-        "Toy", guid, rows, MESSAGES, constants=[MASS_OF, STIFFNESS_OF, 0.0], state=[*START, 0.0], inputs=[3.0, 0.0],
+        "Toy", guid, rows, MESSAGES, kernels=KERNELS, constants=[MASS_OF, STIFFNESS_OF, 0.0], state=[*START, 0.0], inputs=[3.0, 0.0],
         parameters=[MASS_OF, STIFFNESS_OF, 0.0, 1.0, 0.0, 5.0, 0.1], n_outputs=5, n_groups=2,
     )  # fmt: skip
 

@@ -52,7 +52,7 @@ def library(folder: Path) -> bytes:
 
 
 def _compiled(command: list[str], place: Path) -> bytes:
-    with tempfile.TemporaryDirectory(dir=place.parent) as work:
+    with tempfile.TemporaryDirectory(dir=place.parent, ignore_cleanup_errors=True) as work:  # a virus scanner may be at it
         made, packed = Path(work, "loader.so"), Path(work, "loader.so.z")
         caches = {"ZIG_GLOBAL_CACHE_DIR": work, "ZIG_LOCAL_CACHE_DIR": work}
         done = subprocess.run(

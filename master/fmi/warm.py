@@ -2,6 +2,7 @@
 
 import gc
 import runpy
+import select
 import sys
 
 
@@ -9,7 +10,8 @@ def main(resources: str, step: float) -> None:
     """Through initialisation, one step, and a look at every output. Raises what goes wrong."""
     gc.disable()  # the compiler makes much, and little of it is ever free
     runtime = runpy.run_path(f"{resources}/runtime.py")
-    runtime["end_with_reader"](sys.stdout.fileno())
+    if hasattr(select, "poll"):  # not on Windows
+        runtime["end_with_reader"](sys.stdout.fileno())
     slave = runtime["load"](resources).__self__.slave_class(instance_name="warm", resources=resources, visible=False)
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()

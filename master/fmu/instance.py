@@ -78,7 +78,7 @@ class Fmu:
         self.can_rollback = bool(model.coSimulation.canGetAndSetFMUstate)
         self.has_derivatives = bool(model.coSimulation.providesDirectionalDerivative)
         self.can_vary_step = bool(model.coSimulation.canHandleVariableCommunicationStepSize)
-        folder = tempfile.TemporaryDirectory(prefix="fmu_")
+        folder = tempfile.TemporaryDirectory(prefix="fmu_", ignore_cleanup_errors=True)  # Windows keeps a library that is loaded
         location = Path(folder.name, "resources").as_uri()
         if (model.generationTool or "").startswith("PythonFMU"):  # which knows no escape but that of the blank
             location = f"file://{folder.name}/resources".replace(" ", "%20")

@@ -39,8 +39,7 @@ def prepare(scene: Scene, arguments: Sequence[str] = ()) -> dict[str, Path]:
                 raise KeyboardInterrupt
             output, _ = child.communicate(request)
         except BaseException:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(child.pid, signal.SIGKILL)  # it leads those that it has started
+            _kill(child)
             child.wait()
             raise
     try:
@@ -50,3 +49,12 @@ def prepare(scene: Scene, arguments: Sequence[str] = ()) -> dict[str, Path]:
     if "error" in answer:
         raise (UsageError if answer.get("exit") == 2 else RunError)(answer["error"])
     return {name: Path(path) for name, path in answer["fmus"].items()}
+
+
+def _kill(child: subprocess.Popen[str]) -> None:
+    """End `child`, and those that it has started, which it leads; on Windows these come to their end."""
+    if not hasattr(os, "killpg"):
+        child.kill()
+        return
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child.pid, signal.SIGKILL)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -82,7 +83,8 @@ def prepare(mapping: dict[str, Any], folder: Path | None, by_python: bool = Fals
 
 def main(arguments: list[str]) -> None:
     """Entry point."""
-    end_with_reader(sys.stdout.fileno())
+    if hasattr(select, "poll"):  # not on Windows, where the process comes to its end first
+        end_with_reader(sys.stdout.fileno())
     folder = Path(arguments[1]) if arguments[:1] == ["--export"] else None
     try:
         answer = prepare(json.load(sys.stdin), folder, "--python" in arguments)
@@ -90,6 +92,8 @@ def main(arguments: list[str]) -> None:
         answer = {"error": str(error), "exit": 2 if isinstance(error, UsageError) else 1}
     except OSError as error:  # a full disk
         answer = {"error": f"the scene cannot be prepared: {error}", "exit": 1}
+    except KeyboardInterrupt:  # which Windows tells all processes of a console
+        return
     try:
         json.dump(answer, sys.stdout)
         sys.stdout.flush()

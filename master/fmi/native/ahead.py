@@ -42,7 +42,7 @@ def made_ahead(
 
     def make(recipe: Recipe) -> None:
         if not all(kept(platform, recipe.name, recipe.bundle, cache_folder("libraries")).is_file() for platform in platforms):
-            request = json.dumps([str(recipe.package), recipe.unit, recipe.parameters, [platform.folder for platform in platforms]])
+            request = json.dumps([str(recipe.package), recipe.unit, recipe.parameters, [platform.triple for platform in platforms]])
             done = subprocess.run([sys.executable, "-P", "-m", __name__, request], capture_output=True, text=True)
             if done.returncode:
                 raise RunError(f"the FMU's kernels cannot be compiled: {' '.join(done.stderr.split())[-1000:]}")
@@ -65,7 +65,7 @@ def main(request: str) -> None:
     unit.initialize(0.0, {})  # compiles what Python calls
     machine = functools.cache(lambda: machine_of(unit))
     for platform in (*PLATFORMS, ARM):
-        if platform.folder in wanted:
+        if platform.triple in wanted:
             library(machine, platform, recipe.name, recipe.bundle, cache_folder("libraries"))
 
 

@@ -26,7 +26,7 @@ from ..cache import cache_folder
 from ..description import Variable
 from ..document import icon_png, page_html
 from ..ports import Ports
-from .machine import HERE, SOURCES, Machine, Platform, library
+from .machine import HERE, SOURCES, Machine, Platform, joined, kinship, library
 from .tables import Row, unit_file
 
 _SIZES = 7  # numbers before a unit's constants, see kernels.c
@@ -45,10 +45,13 @@ def native_fmu(recipe: Recipe, unit_class: type[Any], platforms: Sequence[Platfo
     unit = unit_class(schema.build(unit_class.PARAMETERS, recipe.parameters))
     native = kernels_of(unit)
     machine = functools.cache(lambda: machine_of(unit))  # made when a library is not kept
-    libraries = {p: library(machine, p, recipe.name, recipe.bundle, cache_folder("libraries")) for p in platforms}
-    files = {f"binaries/{p.folder}/{recipe.name}.{p.ending}": made for p, made in libraries.items()}
+    libraries: dict[str, list[bytes]] = {}
+    for platform in platforms:
+        made = library(machine, platform, recipe.name, recipe.bundle, cache_folder("libraries"))
+        libraries.setdefault(f"binaries/{platform.folder}/{recipe.name}.{platform.ending}", []).append(made)
     place.parent.mkdir(parents=True, exist_ok=True)
     finished = place.with_name(f".{os.getpid()}_{place.name}")
+    files = {name: joined(parts) for name, parts in libraries.items()}
     _write(finished, files | _described(recipe, unit, native, _digest(recipe, platforms)))
     finished.replace(place)
     if destination is None:
@@ -106,14 +109,14 @@ def _described(recipe: Recipe, unit: Any, native: ModuleType, digest: str) -> di
         "modelDescription.xml": ElementTree.tostring(model, "utf-8", xml_declaration=True),
         "documentation/index.html": page.encode(),
         "model.png": icon_png(),
-        "resources/unit.bin": unit_data(recipe.name, guid, slave, unit, native),
+        "resources/unit.bin": unit_data(recipe, guid, slave, unit, native),
         **licenses.entry(recipe.name, recipe.license, recipe.author),
         **licenses.of_package("pipelay"),
         **licenses.of_package("numba"),
     }
 
 
-def unit_data(name: str, guid: str, slave: UnitSlave, unit: Any, native: ModuleType) -> bytes:
+def unit_data(recipe: Recipe, guid: str, slave: UnitSlave, unit: Any, native: ModuleType) -> bytes:
     """The content of unit.bin: see tables.py."""
     ports: Ports = slave.ports
     held = ports.held(ports.start)
@@ -136,10 +139,11 @@ def unit_data(name: str, guid: str, slave: UnitSlave, unit: Any, native: ModuleT
     remarks = [line.replace("%", "%%") for line in unit.remark.splitlines() if line not in _said_by_kernels(unit, native)]
     sizes = [_SIZES + len(unit.constants), len(unit.state), len(ports.start), n_outputs, len(numbers), len(native.MESSAGES), len(remarks)]
     return unit_file(
-        name,
+        recipe.name,
         guid,
         rows,
         [*native.MESSAGES, *remarks],
+        kernels=kinship(recipe.bundle),
         constants=np.concatenate([np.array(sizes, dtype=float), unit.constants]),
         state=unit.state,
         inputs=ports.start,

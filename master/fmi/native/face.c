@@ -395,12 +395,6 @@ FMI int fmi2FreeFMUstate(void *c, void **handle) {
     return OK;
 }
 
-static uint64_t checksum(const char *bytes, size_t size) { /* FNV-1a */
-    uint64_t sum = 0xcbf29ce484222325u;
-    for (size_t i = 0; i < size; i++) sum = (sum ^ (unsigned char)bytes[i]) * 0x100000001b3u;
-    return sum;
-}
-
 static size_t bytes_of_state(const Instance *it) { return sizeof(Head) + (size_t)state_numbers(it) * sizeof(double); }
 
 FMI int fmi2SerializedFMUstateSize(void *c, void *handle, size_t *size) {

@@ -25,7 +25,7 @@ typedef struct {
     int64_t reserved[2];
 } Variable;
 
-typedef struct { /* head of unit.bin, without the first 16 bytes */
+typedef struct { /* of unit.bin, behind its head */
     int64_t n_constants, n_state, n_inputs, n_outputs, n_parameters, n_groups, n_variables, n_messages, n_text, guid, name;
 } Sizes;
 
@@ -100,6 +100,12 @@ static inline void copy(double *to, const double *from, int64_t n) { memcpy(to, 
 static inline int equal(const double *one, const double *other, int64_t n) { return !memcmp(one, other, (size_t)n * sizeof *one); }
 
 static inline int within(int64_t index, int64_t n) { return index >= 0 && index < n; }
+
+static inline uint64_t checksum(const char *bytes, size_t size) { /* FNV-1a */
+    uint64_t sum = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < size; i++) sum = (sum ^ (unsigned char)bytes[i]) * 0x100000001b3u;
+    return sum;
+}
 
 static inline const char *text_at(const Unit *unit, int64_t offset) { return unit->text + offset; }
 

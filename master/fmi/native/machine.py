@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import struct
 import tempfile
 import zlib
 from collections.abc import Callable, Iterable, Sequence
@@ -25,11 +26,13 @@ from . import windows, zig
 
 HERE = Path(__file__).parent
 SOURCES = ("face.c", "unit.c", "kernels.c", "face.h", "windows.c", "windows.py")
+LAYOUT = ("unit.c", "kernels.c", "face.h", "tables.py", "export.py")  # what writes and reads the data of a unit
 KERNELS = ("constants", "start", "step", "outputs")
 FAST = ("step", "outputs")  # those that are there for the better kind of processor too
 _MATH = "sqrt|hypot|pow|fmod|floor|exp|expm1|log|log10|a?(sin|cos|tan)h?|atan2|sincos"
 NEEDED = re.compile(rf"NRT_\w+|numba_attempt_nocopy_reshape|release_reference|llvm\..*|mem(cpy|set|move)|{_MATH}")
 FLAGS = ("-std=c11", "-O2", "-fvisibility=hidden", "-shared", "-s", "-ffp-contract=off")
+_PAGE = 2**14  # bytes, of the processors of macOS
 _RELEASE = "llvm.x86.atomic.sub.cc.i64"  # the one instruction of x86 in numba's code
 
 
@@ -48,9 +51,10 @@ _X86 = (("base", "x86-64-v2"), ("v3", "x86-64-v3"))
 PLATFORMS = (
     Platform("linux64", "so", "x86_64-unknown-linux-gnu", "x86_64-linux-gnu.2.17", _X86),
     Platform("win64", "dll", "x86_64-pc-windows-gnu", "x86_64-windows-gnu", _X86),
-    Platform("darwin64", "dylib", "x86_64-apple-macosx11.0.0", "x86_64-macos", _X86),
+    Platform("darwin64", "dylib", "x86_64-apple-macosx11.0.0", "x86_64-macos", _X86[:1]),
+    Platform("darwin64", "dylib", "arm64-apple-macosx11.0.0", "aarch64-macos", (("base", "apple-m1"),)),  # joined with the one above
 )
-ARM = Platform("aarch64-linux", "so", "aarch64-unknown-linux-gnu", "aarch64-linux-gnu.2.17", (("base", "generic"),))
+ARM = Platform("linux64", "so", "aarch64-unknown-linux-gnu", "aarch64-linux-gnu.2.17", (("base", "generic"),))  # FMI 2 has no name for it
 
 
 def own_platform() -> Platform:
@@ -91,7 +95,7 @@ class Machine:
             if not value.is_declaration and value.name not in self._names:
                 value.linkage = "internal"
         text = re.sub(rf"declare [^\n]*@{re.escape(_RELEASE)}\([^\n]*", "declare i8 @release_reference(ptr, i64, i32)", str(whole))
-        return text.replace(f"@{_RELEASE}", "@release_reference")
+        return text.replace(f"@{_RELEASE}", "@release_reference").replace("@_hypot(", "@hypot(")  # its name on Windows
 
     def object_file(self, platform: Platform, level: str) -> bytes:
         """Object file for a platform and a level of its processors. Raises RunError where the kernels need what is not there."""
@@ -115,9 +119,17 @@ class Machine:
         return bytes(machine.emit_object(module))
 
 
+def kinship(key: str) -> int:
+    """A number that a unit's library and its data have in common: of its package, whose hash is `key`, and of the layout of the data."""
+    digest = hashlib.sha256(key.encode())
+    for source in LAYOUT:
+        digest.update((HERE / source).read_bytes())
+    return int.from_bytes(digest.digest()[:8], "little")
+
+
 def kept(platform: Platform, name: str, key: str, folder: Path) -> Path:
     """Where the library of a unit for a platform is kept in `folder`, by the hash `key` of its package."""
-    facts = repr((key, platform, FLAGS, numba.__version__, llvmlite.__version__)).encode()
+    facts = repr((kinship(key), platform, FLAGS, numba.__version__, llvmlite.__version__)).encode()
     facts += b"".join((HERE / source).read_bytes() for source in (*SOURCES, "machine.py"))
     return folder / f"{name}_{platform.folder}_{hashlib.sha256(facts).hexdigest()[:12]}.z"
 
@@ -129,23 +141,37 @@ def library(machine: Callable[[], Machine], platform: Platform, name: str, key: 
         return zlib.decompress(place.read_bytes())
     except (OSError, zlib.error):  # not there, or not whole
         folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder) as work:
+    with tempfile.TemporaryDirectory(dir=folder, ignore_cleanup_errors=True) as work:  # a virus scanner may be at it
         objects = []
         for level, _ in platform.levels:
             objects.append(Path(work, f"{level}.o"))
             objects[-1].write_bytes(machine().object_file(platform, level))
         made, packed = Path(work, f"unit.{platform.ending}"), Path(work, "packed")
-        link(platform, objects, made, folder)
+        link(platform, objects, made, folder, f"-DKERNELS={kinship(key)}u")
         packed.write_bytes(zlib.compress(made.read_bytes()))
         packed.replace(place)
         return made.read_bytes()
+
+
+def joined(libraries: Sequence[bytes]) -> bytes:
+    """One library of macOS for several kinds of processor, each in pages of its own behind a table of them; a single one as it is."""
+    if len(libraries) == 1:
+        return libraries[0]
+    table, content = struct.pack(">2I", 0xCAFEBABE, len(libraries)), b""
+    for library in libraries:
+        content += bytes(-len(content) % _PAGE)
+        kind = struct.unpack_from("<2I", library, 4)
+        table += struct.pack(">5I", *kind, _PAGE + len(content), len(library), _PAGE.bit_length() - 1)
+        content += library
+    return table.ljust(_PAGE, b"\0") + content
 
 
 def link(platform: Platform, objects: Sequence[Path], made: Path, folder: Path, *flags: str) -> None:
     """Compile the C face and link it. Raises RunError with the compiler's words where it fails."""
     several = ["-DLEVELS"] if len(objects) > 1 else []
     sources = [str(HERE / source) for source in SOURCES if source.endswith(".c") and source != "windows.c"]
-    end = windows.arguments(made.parent) if platform.ending == "dll" else ["-fPIC", "-lm"]
+    plain = ["-fPIC", "-lm", *(["-Wl,-install_name,unit.dylib"] if platform.ending == "dylib" else [])]  # else that of the folder here
+    end = windows.arguments(made.parent) if platform.ending == "dll" else plain
     files = ["-o", str(made), *sources, *map(str, objects)]
     command = [*zig.COMMAND, "cc", "-target", platform.target, *FLAGS, *several, *flags, *files, *end]
     with locked(folder):

@@ -1,6 +1,7 @@
 """The data of a unit in machine code, `resources/unit.bin`, which its C face (face.c) reads: constants, start state, variables, messages.
 
-Little-endian, every number of 8 bytes, then a pool of texts, to which the tables point by offset.
+Little-endian, every number of 8 bytes, then a pool of texts, to which the tables point by offset. At its head stand a number that the
+library has too (see `kinship` of machine.py) and the checksum of all that follows.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ def unit_file(
     variables: Sequence[Row],
     messages: Iterable[str],
     *,
+    kernels: int,
     constants: ArrayLike,
     state: ArrayLike,
     inputs: ArrayLike,
@@ -107,7 +109,16 @@ def unit_file(
         *about,
     ]
     data = b"".join(vector.tobytes() for vector in vectors)
-    return b"".join([MAGIC, struct.pack("<11q", *counts), data, rows, struct.pack(f"<{len(places)}q", *places), pool])
+    content = b"".join([struct.pack("<11q", *counts), data, rows, struct.pack(f"<{len(places)}q", *places), pool])
+    return MAGIC + struct.pack("<QQ", kernels, checksum(content)) + content
+
+
+def checksum(content: bytes) -> int:
+    """FNV-1a of 64 bits, as the face has it."""
+    total = 0xCBF29CE484222325
+    for byte in content:
+        total = (total ^ byte) * 0x100000001B3 % 2**64
+    return total
 
 
 def _check(row: Row, sizes: dict[str, int], n_groups: int) -> None:

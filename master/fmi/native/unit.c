@@ -15,7 +15,7 @@ enum { WINDOWS = 1 };
 enum { WINDOWS = 0 };
 #endif
 
-enum { LONGEST_LINE = 1000, LONGEST_TEXT = 4096, MOST_GROUPS = 64, HEADER = 104 };
+enum { LONGEST_LINE = 1000, LONGEST_TEXT = 4096, MOST_GROUPS = 64 };
 
 /* messages */
 
@@ -205,6 +205,12 @@ int make_ready(Instance *it) {
 
 /* unit.bin */
 
+typedef struct {
+    char magic[16];
+    uint64_t kernels, checksum; /* of the library that it belongs to, see machine.py; of all that follows */
+} Head;
+enum { HEADER = sizeof(Head) + sizeof(Sizes) };
+
 static FILE *open_file(const char *path) {
 #ifdef _WIN32
     int size = MultiByteToWideChar(UTF8, 0, path, -1, NULL, 0);
@@ -281,17 +287,23 @@ static int sound(const Unit *unit) {
     return 1;
 }
 
-/* Lays `unit` over the bytes of unit.bin. */
-static int open_unit(Unit *unit, char *bytes, size_t size) {
+/* Lays `unit` over the bytes of unit.bin; answers what is wrong with them, NULL if nothing is. */
+static const char *open_unit(Unit *unit, char *bytes, size_t size) {
+    static const char foreign[] = "not the data of a unit, or not all of them";
+    Head head;
     unit->bytes = bytes;
-    if (size < HEADER || memcmp(bytes, "pipelay unit 1\n", 16)) return 0;
-    memcpy(&unit->n, bytes + 16, sizeof unit->n);
+    if (size < HEADER) return foreign;
+    memcpy(&head, bytes, sizeof head);
+    if (memcmp(head.magic, "pipelay unit 1\n", sizeof head.magic)) return foreign;
+    if (head.kernels != KERNELS) return "of another version or unit than the library; take both from one FMU";
+    if (head.checksum != checksum(bytes + sizeof head, size - sizeof head)) return foreign;
+    memcpy(&unit->n, bytes + sizeof head, sizeof unit->n);
     const Sizes *n = &unit->n;
     for (const int64_t *each = &n->n_constants; each <= &n->n_text; each++)
-        if (!within(*each, INT32_MAX)) return 0;
+        if (!within(*each, INT32_MAX)) return foreign;
     int64_t doubles = n->n_constants + n->n_state + n->n_inputs + n->n_parameters;
-    if (n->n_text < 1 || n->n_groups > MOST_GROUPS) return 0;
-    if ((int64_t)size != HEADER + 8 * (doubles + 12 * n->n_variables + n->n_messages) + n->n_text) return 0;
+    if (n->n_text < 1 || n->n_groups > MOST_GROUPS) return foreign;
+    if ((int64_t)size != HEADER + 8 * (doubles + 12 * n->n_variables + n->n_messages) + n->n_text) return foreign;
     unit->constants = (const double *)(bytes + HEADER);
     unit->state = unit->constants + n->n_constants;
     unit->inputs = unit->state + n->n_state;
@@ -299,7 +311,7 @@ static int open_unit(Unit *unit, char *bytes, size_t size) {
     unit->variables = (const Variable *)(unit->parameters + n->n_parameters);
     unit->messages = (const int64_t *)(unit->variables + n->n_variables);
     unit->text = (const char *)(unit->messages + n->n_messages);
-    return sound(unit);
+    return sound(unit) ? NULL : foreign;
 }
 
 int load_unit(Instance *it, const char *location) {
@@ -309,8 +321,9 @@ int load_unit(Instance *it, const char *location) {
     decode(location, path);
     strcat(path, "/unit.bin");
     char *bytes = read_file(it, path, &size);
+    const char *wrong = bytes ? open_unit(&it->unit, bytes, size) : NULL;
     int status = bytes ? OK : ERROR;
-    if (bytes && !open_unit(&it->unit, bytes, size)) status = refuse(it, "resources: %s: not the data of a unit, or not all of them", path);
+    if (wrong) status = refuse(it, "resources: %s: %s", path, wrong);
     free(path);
     return status;
 }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import resource
 import statistics
 import time
 from collections.abc import Callable, Sequence
@@ -58,11 +57,9 @@ def measure(nodes: int) -> dict[str, Any]:
 
 
 def _peak_memory() -> float:
-    """Largest resident memory of this process so far [MB]. Linux counts that of the process it was started from in `getrusage`."""
-    status = Path("/proc/self/status")
-    if status.exists():
-        return next(float(line.split()[1]) for line in status.read_text().splitlines() if line.startswith("VmHWM")) / 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    """Largest resident memory of this process so far [MB]; `getrusage` counts that of the process it was started from."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024.0
 
 
 def sweep(counts: Sequence[int], tick: Callable[[], object]) -> list[dict[str, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -95,7 +96,8 @@ CASES: dict[str, Callable[[Path, Tick], tuple[Rows, list[str], list[Limit]]]] = 
     "heave": _heave, "snap": _snap, "paper": _paper, "statics": _statics, "forces": _forces, "costs": _costs, "nodes": _nodes,
     "start": _start,
 }  # fmt: skip
-NAMES = tuple(CASES)
+ON_LINUX = ("nodes", "start")  # which ask the system for memory and for the time of processes that have ended
+NAMES = tuple(name for name in CASES if sys.platform == "linux" or name not in ON_LINUX)
 
 
 def study(names: Sequence[str], folder: Path, stream: TextIO) -> tuple[str, bool]:
