@@ -16,7 +16,7 @@ import pytest
 
 from master.__main__ import main
 from master.coupling.ledger import EnergyCheckFailed
-from master.fmu.instance import FmuFailed, StepRejected
+from master.fmu.errors import FmuFailed, StepRejected
 from master.run import prepared
 from master.run import simulate as run
 from master.run.drive import Cost, pose_gap, top_tension

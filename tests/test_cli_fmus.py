@@ -10,9 +10,10 @@ import pytest
 
 from master import commands
 from master.__main__ import main
-from master.coupling.bond import FmuEnd, mobility_end
+from master.coupling.end import FmuEnd, mobility_end
 from master.coupling.ledger import EnergyCheckFailed
-from master.fmu.instance import Fmu, FmuFailed
+from master.fmu.errors import FmuFailed
+from master.fmu.instance import Fmu
 from master.run import drive
 from master.run.drive import open_drive
 from master.run.prepared import prepare

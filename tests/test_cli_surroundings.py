@@ -211,7 +211,8 @@ class Plain(Fmi2Slave):
 """
 STEPPED = """
 import sys
-from master.fmu.instance import Fmu, FmuFailed
+from master.fmu.errors import FmuFailed
+from master.fmu.instance import Fmu
 try:
     with Fmu(sys.argv[1]) as fmu:
         fmu.initialize()

@@ -12,7 +12,7 @@ what it is given. The step is accepted when the bond makes no energy. With F = -
 Z and Y follow the ends' ports, where there are such, which makes the iteration Newton's; else Z follows Broyden's update,
 and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap.
 
-An impedance end that can yield (see `master.coupling.bond.FmuEnd.meet`) takes V_free and Y, which that end's `derivative` gives at the
+An impedance end that can yield (see `master.coupling.end.FmuEnd.meet`) takes V_free and Y, which that end's `derivative` gives at the
 extrapolated f, and solves for V and f at once, within its own Newton iteration. Where the mobility end answers that f with the same V to
 round-off, as it does where it is nearly linear over the error of the extrapolation, the step is done, with one solve of the impedance end.
 Else V_free and Y are taken anew at the f found, and one more solve, with the V that the mobility end answers, confirms it. Without
@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..fmu.instance import StepFailed, StepRejected
+from ..fmu.errors import StepFailed, StepRejected
 from .bond import Bond, Matrix, Vector
 from .predictor import Extrapolation
 from .scheme import SLIVER, Check, Counters, CouplingFailed, End, Step, accept

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..fmu.instance import StepRejected
+from ..fmu.errors import StepRejected
 from .bond import Bond, Matrix, Vector
 from .scheme import Check, Counters, CouplingFailed, End, Step, accept, within
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..fmu.instance import StepRejected
+from ..fmu.errors import StepRejected
 from .bond import Bond, Vector
 from .energy_consistent import PATIENCE, EnergyConsistent
 from .predicted_end import PredictedEnd

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..fmu.instance import StepRejected
+from ..fmu.errors import StepRejected
 from .bond import Bond, Matrix, Vector
 from .mobility_law import MeasuredLaw
 from .predictor import Extrapolation

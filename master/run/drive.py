@@ -11,13 +11,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from master.coupling.bond import end_value_ends, impedance_end, mobility_end
 from master.coupling.choose import coupling
+from master.coupling.end import end_value_ends, impedance_end, mobility_end
 from master.coupling.energy_consistent import SMALLEST_STEP
 from master.coupling.hang_off import hang_off
 from master.coupling.ledger import Columns, Ledger
 from master.coupling.scheme import Scheme, Step
-from master.fmu.instance import Fmu, Names, StepRejected
+from master.fmu.errors import StepRejected
+from master.fmu.instance import Fmu, Names
 from master.results.recorder import Source
 from master.run.warnings import Remarks
 from master.scene.reading import Sections, simulated

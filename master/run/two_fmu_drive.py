@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from master.coupling.bond import Bond, FmuEnd, end_value_ends, impedance_end, mobility_end
+from master.coupling.bond import Bond
 from master.coupling.choose import coupling
+from master.coupling.end import FmuEnd, end_value_ends, impedance_end, mobility_end
 from master.coupling.ledger import Ledger
 from master.errors import UsageError
 from master.fmu.instance import Fmu
