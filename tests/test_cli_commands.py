@@ -19,7 +19,7 @@ from master.coupling.ledger import EnergyCheckFailed
 from master.fmu.errors import FmuFailed, StepRejected
 from master.run import prepared
 from master.run import simulate as run
-from master.run.drive import Cost, pose_gap, top_tension
+from master.run.pipe_drive import Cost, pose_gap, top_tension
 from master.run.warnings import Remarks
 from master.scene import keys
 from master.scene.reading import FOUND, from_mapping, load

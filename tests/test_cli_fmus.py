@@ -15,7 +15,7 @@ from master.coupling.ledger import EnergyCheckFailed
 from master.fmu.errors import FmuFailed
 from master.fmu.instance import Fmu
 from master.run import drive
-from master.run.drive import open_drive
+from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
 from master.scene import reading as scene
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from master.run.drive import open_drive, pose_gap
+from master.run.pipe_drive import open_drive, pose_gap
 from master.run.prepared import prepare
 from master.scene import reading as scene
 from master.with_units.monolithic import march

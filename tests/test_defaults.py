@@ -8,7 +8,7 @@ import pytest
 
 from master.__main__ import main
 from master.errors import UsageError
-from master.run.drive import top_tension
+from master.run.pipe_drive import top_tension
 from master.scene import keys, physics
 from master.scene import remarks as scene_remarks
 from master.scene.reading import BUILT_IN, DEFAULTS, from_mapping, load

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from master.__main__ import main
 from master.errors import RunError, UsageError
-from master.run.drive import open_drive
+from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
 from master.scene import reading as scene
 from master.scene.reading import from_mapping

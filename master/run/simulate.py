@@ -27,7 +27,8 @@ from master.process.screen import patience
 from master.process.signals import postponed
 from master.results import figures, report
 from master.results.recorder import SIGNALS, Recorder, Signal
-from master.run.drive import Drive, open_drive
+from master.run.drive import Drive
+from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
 from master.run.two_fmu_drive import open_bonded, signals
 from master.scene import physics

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from master.errors import RunError
-from master.run.drive import LOADS
+from master.run.pipe_drive import LOADS
 from master.scene.reading import Scene
 from master.scene.sections import mean_load
 from master.with_units.statics import equilibrium, released

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from master.results.recorder import SIGNALS, Recorder
-from master.run.drive import open_drive
+from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
 from master.run.simulate import row
 from master.scene import reading as scene
