@@ -38,7 +38,7 @@ def run_folder(options: argparse.Namespace) -> Path:
 def statics(options: argparse.Namespace) -> int:
     """Print the coupled equilibrium of a scene."""
     scene = reading.of_pipe(reading.load(options.scene, options.changes))
-    from master.with_units.statics import report  # works with the units' packages, which a run never imports
+    from master.with_units.statics_report import report  # works with the units' packages, which a run never imports
 
     with patience(terminal()), broken_arithmetic("statics"):
         found = report(scene)

@@ -16,7 +16,8 @@ from mesh_scenes import Moving, moving, resting
 from pipe_helpers import P16, heave_case, pitch, sea, started
 
 from master.scene.reading import from_mapping, load
-from master.with_units.statics import equilibrium, report
+from master.with_units.statics import equilibrium
+from master.with_units.statics_report import report
 from pipe_fmu import PipeParameters, Seabed, resolve
 
 EVERY = "EVERY_LINE" in os.environ

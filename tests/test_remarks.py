@@ -13,7 +13,8 @@ from master.errors import RunError, UsageError
 from master.run.warnings import Remarks
 from master.scene import reading as scene
 from master.scene import remarks as scene_remarks
-from master.with_units.statics import equilibrium, report
+from master.with_units.statics import equilibrium
+from master.with_units.statics_report import report
 from pipe_fmu import Pipe, PipeParameters, Section, validity
 from pipe_fmu.slave import PipeUnit
 from vessel_fmu.parameters import Start, VesselParameters

@@ -15,7 +15,8 @@ from master.run.prepared import prepare
 from master.scene import reading as scene
 from master.scene.reading import from_mapping
 from master.with_units.monolithic import march
-from master.with_units.statics import equilibrium, released, report
+from master.with_units.statics import equilibrium, released
+from master.with_units.statics_report import report
 from vessel_fmu.vessel import Vessel
 
 STEEL = {"outer_diameter": 0.4064, "wall_thickness": 0.025}

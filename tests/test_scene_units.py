@@ -5,7 +5,8 @@ import pytest
 
 from master.errors import UsageError
 from master.scene import reading as scene
-from master.with_units.statics import equilibrium, report
+from master.with_units.statics import equilibrium
+from master.with_units.statics_report import report
 
 BAD_VALUES = {
     "unknown key": ("pipe.section.diameter=0.4", "pipe.section.diameter = 0.4", "unknown key"),
