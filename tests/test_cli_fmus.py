@@ -14,7 +14,7 @@ from master.coupling.end import FmuEnd, mobility_end
 from master.coupling.ledger import EnergyCheckFailed
 from master.fmu.errors import FmuFailed
 from master.fmu.instance import Fmu
-from master.run import drive
+from master.run import pipe_drive
 from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
 from master.scene import reading as scene
@@ -78,7 +78,7 @@ def test_a_wrong_connection_fails_the_energy_check_with_exit_code_1(monkeypatch,
         good.__class__, good.wrong = Sabotaged, wrong
         return good
 
-    monkeypatch.setattr(drive, "mobility_end", connect)
+    monkeypatch.setattr(pipe_drive, "mobility_end", connect)
     changes = [f"--set={change}" for change in ("simulation.duration=5", "simulation.recording_step=1", *BUSY)]
     assert main(["run", *changes, "-o", str(tmp_path)]) == 1
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -137,7 +137,7 @@ def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
     loaded = scene.load("paper")
     exported = {name: tmp_path / f"{name}.fmu" for name in ("pipe", "vessel")}
     with open_drive(loaded.sections, exported) as moving:
-        gap = drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
+        gap = pipe_drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
         assert max(gap.values()) < 1e-9
 
 

@@ -44,17 +44,17 @@ class OneSided(EnergyConsistent):
             f"(largest: {gaps}) and made up for in the next step"
         )
 
-    def _attempt(self, time: float, step: float) -> Step:
-        trial = super()._attempt(time, step) if self.impedance.rollback else self._met(time, step)
-        if not self._converged:
-            return trial
+    def _attempt(self, time: float, step: float) -> tuple[Step, bool]:
+        trial, agreed = super()._attempt(time, step) if self.impedance.rollback else (self._met(time, step), True)
+        if not agreed:
+            return trial, False
         held, flow, wanted = self._foreseen.take(time, step, trial.effort)
         if self.impedance.rollback and self._outweighed():
             trial = self._followed(trial, held, flow, wanted)
         else:
             trial = replace(trial, residual=step * float(held @ flow - trial.effort @ trial.flow))
         self._foreseen.owe(step * (flow - trial.flow), step * (trial.effort - held))
-        return trial
+        return trial, True
 
     def _outweighed(self) -> bool:
         """Whether the mobility end yields less than the impedance end, Y Z < 1: an error of the foreseen flow is then small to it."""
@@ -98,5 +98,4 @@ class OneSided(EnergyConsistent):
         except StepRejected as rejection:
             raise CouplingFailed(time, step, float("nan"), f"{rejection}; it cannot roll back") from None
         assert met is not None
-        self._converged = True
         return Step(time, step, *met, 0.0, 1)
