@@ -15,8 +15,7 @@ from master.process.folders import SCRATCH, taken, unwritable
 from master.process.screen import complain, patience, say, terminal
 from master.process.signals import postponed
 from master.run.prepared import prepare
-from master.scene import physics, reading
-from master.scene import remarks as scene_remarks
+from master.scene import physics, reading, remarks
 
 
 def run(options: argparse.Namespace) -> int:
@@ -42,7 +41,7 @@ def statics(options: argparse.Namespace) -> int:
 
     with patience(terminal()), broken_arithmetic("statics"):
         found = report(scene)
-        found["remarks"] = [*scene_remarks.of(scene, at_rest=True).get("scene", []), *found["remarks"]]
+        found["remarks"] = [*remarks.of(scene, at_rest=True).get("scene", []), *found["remarks"]]
         text = json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found)
     say(text, result=True)
     return 0
@@ -64,7 +63,7 @@ def export(options: argparse.Namespace) -> int:
             written = _moved([*fmus.values(), *joined], folder)
     for path in written:
         say(str(path))
-    for words in scene_remarks.of(scene).get("scene", []):
+    for words in remarks.of(scene).get("scene", []):
         complain(f"remark: {words}", 0)
     return 0
 
