@@ -19,7 +19,8 @@ from units.spring_fmu.parameters import Failure
 from units.toys import BODY, SPRING, build_pair, spring_recipe
 
 from master.fmi import licenses
-from master.fmi.build import Recipe, build_fmu, bundled_package, cache_folder, cached_fmu
+from master.fmi.build import Recipe, build_fmu, bundled_package, cached_fmu
+from master.fmi.cache import cache_folder
 from master.fmi.description import base_unit
 from master.fmu.errors import FmuError, FmuFailed, StepFailed, StepRejected
 from master.fmu.instance import Fmu

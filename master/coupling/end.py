@@ -1,4 +1,4 @@
-"""The ends of a bond, each an FMU; see `master.coupling.bond`."""
+"""The ends of a bond: FMUs that step while they hold one set of its ports and answer with the other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SAME = 1e-9  # of an answer: a unit that is restored repeats a step to its own 
 
 
 class FmuEnd:
-    """One end of a bond: an FMU that steps while it holds one set of ports and answers with the conjugate one.
+    """One end of a bond, an FMU.
 
     `derivative` names the FMU's port with d(result)/d(held), row by row, times `sign`; without it the FMU's directional
     derivatives serve, where it provides them, else difference quotients. `mean` names the outputs whose product with what
@@ -54,7 +54,7 @@ class FmuEnd:
         self._saved, self._moved = self.fmu.snapshot() if self.rollback else None, False
 
     def solve(self, time: float, step: float, held: Vector) -> Vector:
-        """Step from `time` with `held` on the ports; the conjugate ports. Raises StepRejected, FmuFailed."""
+        """Step from `time` with `held` on the ports and return the conjugate ports. Raises StepRejected, FmuFailed."""
         if self._yielding:
             self._step(time, step, (*self._held, self._yielding), np.concatenate([held, self._stiff]))
         else:
@@ -65,7 +65,7 @@ class FmuEnd:
         return result
 
     def meet(self, time: float, step: float, free: Vector, mobility: Matrix) -> tuple[Vector, Vector] | None:
-        """Step with a flow V that meets V = free + mobility x answer; V and answer, which belong together. None if the FMU cannot.
+        """Step with the flow V for which V = `free` + `mobility` @ answer; return V and the answer, or None if the FMU cannot find them.
 
         Raises as `solve`.
         """
@@ -78,7 +78,7 @@ class FmuEnd:
         return values[free.size :], self._signs * values[: free.size]
 
     def restores(self, time: float, step: float, held: Vector) -> bool:
-        """Whether two steps with `held` from one saved state answer alike, where the unit takes such steps; it stands as before."""
+        """Whether two steps with `held` from one saved state answer alike; true where the unit rejects them. It stands as before."""
         self.begin()
         try:
             first, second = (self.solve(time, step, held) for _ in range(2))
@@ -100,7 +100,7 @@ class FmuEnd:
         return StepFailed(f"{self.fmu.name}: step of {step:.6g} s at {time:.9g} s: answers with a number that is not finite")
 
     def result(self) -> Vector:
-        """The conjugate ports as they are."""
+        """The conjugate ports as they are now."""
         return self._signs * self.fmu.get(self._result)
 
     def mean(self) -> Vector:

@@ -114,7 +114,7 @@ class EnergyConsistent:
             self._easy = 0
 
     def _attempt(self, time: float, step: float) -> tuple[Step, bool]:
-        """The step as far as it came, and whether the ends agree on it."""
+        """Try one step. Return it as far as it came, and whether the ends agree on it."""
         fresh = abs(step - self._length) > SLIVER * step  # slopes of another step length are of no use
         start = self._predict(time, step, fresh)
         if (met := self.impedance.meet(time, step, start.free, self._Y)) is not None:
@@ -125,7 +125,7 @@ class EnergyConsistent:
         return self._iterate(time, step, start)
 
     def _predict(self, time: float, step: float, fresh: bool) -> _Point:
-        """Flow and effort as extrapolated, and the law of the mobility end about that effort, with its slope anew where that is needed."""
+        """Extrapolate flow and effort, and solve the mobility end for that effort: V_free, and Y where it is `fresh` or asked for."""
         flow, effort = self._guess.at(time + step / 2)
         answer = self.mobility.solve(time, step, effort)
         slope = self.mobility.derivative() if fresh or self.impedance.yields else None
@@ -135,7 +135,7 @@ class EnergyConsistent:
         return _Point(flow, effort, answer - self._Y @ effort, False)
 
     def _confirm(self, time: float, step: float, flow: Vector, effort: Vector, fresh: bool) -> tuple[Step, bool]:
-        """As `_attempt`, from the flow and effort that the impedance end met: done where the mobility end answers alike."""
+        """Solve the mobility end for the effort at which the impedance end met `flow`. Where it answers otherwise, iterate from there."""
         answer = self.mobility.solve(time, step, effort)
         trial = Step(time, step, answer, effort, step * float(effort @ (answer - flow)), 1)
         if not fresh and self._alike(flow, trial):
@@ -148,7 +148,7 @@ class EnergyConsistent:
         return self._iterate(time, step, start, answer if agreed else None)
 
     def _iterate(self, time: float, step: float, start: _Point, answer: Vector | None = None) -> tuple[Step, bool]:
-        """As `_attempt`, by rounds from a point; `answer`: of the mobility end to the effort of that point, if only to be confirmed."""
+        """Iterate from `start` until the bond makes no energy. `answer` is the mobility end's to that effort, if only to be confirmed."""
         before = np.inf
         for rounds in range(1, LAST_ROUND + 1):
             Z, Y, held = self._Z, self._Y, start.effort
@@ -170,7 +170,7 @@ class EnergyConsistent:
         return trial, False
 
     def _mend(self, start: _Point, trial: Step) -> None:
-        """Z and Y after a round that went from `start` to `trial`."""
+        """Renew Z and Y after the round that went from `start` to `trial`."""
         slope = self.impedance.derivative() if trial.rounds <= DIFFERENCES_ROUNDS[True] else None
         if trial.rounds == DIFFERENCES_ROUNDS[slope is not None]:
             self._Z = -self._differences(self.impedance, trial.time, trial.step, trial.flow, trial.effort)
@@ -181,13 +181,13 @@ class EnergyConsistent:
         self._set_mobility(self.mobility.derivative())
 
     def _alike(self, met: Vector, trial: Step) -> bool:
-        """Whether the flow that the impedance end met is the one that the mobility end answers, to round-off: then the step is done."""
+        """Whether the mobility end answers with the flow that the impedance end met, to round-off: then the step is done."""
         apart, size = self.bond.sizes(np.array([met - trial.flow, trial.flow]))
         agreed = bool((apart <= SAME * size + STILL * self.bond.floors).all())
         return agreed and abs(trial.residual) <= self.tolerance * self._energy_scale(trial)
 
     def _agree(self, met: Vector, trial: Step) -> bool:
-        """As `_alike`, but by the defect to be expected: then the effort needs no mending before it is confirmed."""
+        """Whether it answers so nearly with that flow that the defect to be expected is small: then the effort needs no mending."""
         gap = self._Z @ (met - trial.flow)
         defect = abs(float(gap @ trial.flow)) + abs(float(gap @ self._Y @ gap))
         return defect <= FORESEEN * self.tolerance * abs(float(trial.effort @ trial.flow))
@@ -206,7 +206,7 @@ class EnergyConsistent:
         return trial
 
     def _energy_scale(self, trial: Step) -> float:
-        """What the residual is measured by [J]: energy exchanged, kinetic energy of the moved end, or that of rest.
+        """The energy [J] that the residual is compared with: that exchanged, the moved end's kinetic energy, or what counts as rest.
 
         The kinetic energy counts up to the mean exchange so far: a heavy end that crosses the pull at speed would
         otherwise let residuals pass that add up to more than the tolerance of the energy exchanged.
@@ -223,13 +223,13 @@ class EnergyConsistent:
         return np.column_stack([(end.solve(time, step, held + d) - result) / d.sum() for d in np.diag(increments)])
 
     def _find_impedance(self, time: float, step: float, flow: Vector, effort: Vector) -> None:
-        """Z where the impedance end has answered a flow with this effort: its own, or by differences where it tells none."""
+        """Set Z where the impedance end has answered `flow` with `effort`: what it tells, else by differences."""
         slope = self.impedance.derivative()
         self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
         self._length = step
 
     def _set_mobility(self, Y: Matrix | None) -> None:
-        """Y, unless the mobility end tells none."""
+        """Set Y; None, of an end that tells none, leaves it."""
         if Y is not None:
             self._Y, self._inverse = Y, None
 
@@ -243,7 +243,7 @@ class EnergyConsistent:
         return self._inverse
 
     def _broyden(self, d_flow: Vector, d_force: Vector) -> None:
-        """Least change of Z, measured by the inertia, that explains the last two points."""
+        """Change Z by the least, measured by the inertia, that explains the last two points."""
         weighted = self._inertia @ d_flow
         size = float(d_flow @ weighted)
         if size > 0.0:

@@ -64,9 +64,9 @@ class OneSided(EnergyConsistent):
         return bool(np.abs(np.linalg.eigvals(self._Y @ self._Z)).max() < 1.0)
 
     def _followed(self, trial: Step, held: Vector, flow: Vector, wanted: Vector) -> Step:
-        """The impedance end moved with a mobility end that has answered `held` with `flow`, so that the bond makes no energy.
+        """Solve the impedance end after a mobility end that has answered `held` with `flow`, so that the bond makes no energy.
 
-        It is told the flow `wanted`, and what little besides closes the energy: least by the flows that count, along d(f.V)/dV.
+        Its flow is `wanted` plus what little closes the energy, along d(f.V)/dV: the least in units of the flows that count.
         """
         step, start, Z = trial.step, wanted, self._Z
         try:
@@ -89,7 +89,7 @@ class OneSided(EnergyConsistent):
         return Step(trial.time, step, told, effort, step * made, trial.rounds)
 
     def _met(self, time: float, step: float) -> Step:
-        """The impedance end solved once, on the law of the other."""
+        """Solve the impedance end once, on the law of the other."""
         effort = self._guess.at(time + step / 2)[1]
         flow = self._foreseen.solve(time, step, effort)
         Y = self._foreseen.derivative()

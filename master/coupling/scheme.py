@@ -70,7 +70,7 @@ def accept(step: Step) -> bool:
 
 
 def within(limit: float, macro_step: float) -> float:
-    """The macro step, or what is left of the time if that is less."""
+    """The length of the next step [s]: the macro step, or `limit` if that is less or longer by round-off only."""
     return limit if limit < (1 + SLIVER) * macro_step else macro_step
 
 

@@ -67,7 +67,7 @@ class Coupled(OnBond):
 
 
 class Mover:
-    """The prescribed motion as the other end of the bond: what it supplies goes into the pipe. Reads like an FMU."""
+    """The prescribed motion as the other end of the bond: it passes work from outside on to the pipe. Reads like an FMU."""
 
     name = "mover"
     ports: Mapping[str, object] = dict.fromkeys(("supplied_work", "bond_work"))
@@ -117,7 +117,7 @@ class Prescribed:
         self._steps += 1
 
     def _attempt(self, step: float) -> bool:
-        """One step, kept if the pipe and the ledger accept it; a rejection of the smallest step is final and raised."""
+        """Take one step, and go back unless the pipe and the ledger accept it. Raises StepRejected for the smallest step."""
         flow = np.zeros(6)
         if self._motion is not None:
             flow[:3] = self._motion.mean_velocity(self.time, step)
