@@ -160,9 +160,9 @@ def program() -> int:
     if isinstance(ended, int):
         return ended
     from master import commands
-    from master.process import crash as post_mortem
+    from master.process import crash
 
-    left = post_mortem.bury(commands.run_folder(options), ended) if options.command == "run" else ""
+    left = crash.bury(commands.run_folder(options), ended) if options.command == "run" else ""
     return complain(f"the process {ended.how}{left}", 1)
 
 

@@ -16,8 +16,7 @@ from master.process.folders import SCRATCH, taken, unwritable
 from master.process.screen import complain, patience, say, terminal
 from master.process.signals import postponed
 from master.run.prepared import prepare
-from master.scene import physics, reading
-from master.scene import remarks as scene_remarks
+from master.scene import physics, reading, remarks
 
 
 def run(options: argparse.Namespace) -> int:
@@ -39,11 +38,11 @@ def run_folder(options: argparse.Namespace) -> Path:
 def statics(options: argparse.Namespace) -> int:
     """Print the coupled equilibrium of a scene."""
     scene = reading.of_pipe(reading.load(options.scene, options.changes))
-    from master.with_units.statics import report  # works with the units' packages, which a run never imports
+    from master.with_units.statics_report import report  # works with the units' packages, which a run never imports
 
     with patience(terminal()), broken_arithmetic("statics"):
         found = report(scene)
-        found["remarks"] = [*scene_remarks.of(scene, at_rest=True).get("scene", []), *found["remarks"]]
+        found["remarks"] = [*remarks.of(scene, at_rest=True).get("scene", []), *found["remarks"]]
         text = json.dumps(found, indent=2, allow_nan=False) if options.json else _statics_table(scene, found)
     say(text, result=True)
     return 0
@@ -67,7 +66,7 @@ def export(options: argparse.Namespace) -> int:
             written = _moved([*fmus.values(), *joined], folder)
     for path in written:
         say(str(path))
-    for words in scene_remarks.of(scene).get("scene", []):
+    for words in remarks.of(scene).get("scene", []):
         complain(f"remark: {words}", 0)
     return 0
 

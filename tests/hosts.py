@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from master.__main__ import main as pipelay
+from master.__main__ import main
 from master.fmu.instance import Fmu
-from master.scene import reading as scene
+from master.scene import reading
 from master.with_units.monolithic import march
 
 PROGRAM = Path(__file__).with_name("run_host.py")
@@ -79,7 +79,7 @@ def reference(name: str, changes: Sequence[str], step: float, end: float) -> Arr
 
 
 def _solved_as_one(name: str, changes: Sequence[str], step: float, end: float) -> Array:
-    _, vessel, moments = march(scene.load(name, changes), step, end)
+    _, vessel, moments = march(reading.load(name, changes), step, end)
     rows = [vessel.hang_off_pose(vessel.position(m.vessel), m.vessel.quaternion)[0] for m in moments]
     return np.array(rows)[:: round(SPACING / step)][1:]
 
@@ -125,7 +125,7 @@ def residual(rows: Array) -> float:
 def table(folder: Path, end: float, hosts: Sequence[str]) -> None:
     """Run the hosts to `end` [s] and print the table."""
     changes = [f"simulation.duration={end}", "simulation.snapshots=[]"]
-    pipelay(["export", "-o", str(folder / "files"), *(f"--set={change}" for change in changes)])
+    main(["export", "-o", str(folder / "files"), *(f"--set={change}" for change in changes)])
     kept = folder / f"reference_{end}.npy"
     if not kept.is_file():
         np.save(kept, reference("paper", changes, 0.01, end))

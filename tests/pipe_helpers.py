@@ -10,7 +10,7 @@ from pipe_fmu.environment import Current, Environment
 from pipe_fmu.line import Water
 from pipe_fmu.statics import system as static_kernel
 from pipe_fmu.step import system as step_kernel
-from pipe_fmu.step.integrator import WORKS
+from pipe_fmu.step.state import WORKS
 
 P12 = Section(outer_diameter=0.32385, wall_thickness=0.0206)
 P16 = Section()

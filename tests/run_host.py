@@ -21,7 +21,7 @@ Rows = Iterator[list[float]]
 
 def own(folder: Path, step: float, end: float) -> Rows:
     """The master of this package: energy-consistent, iterated with rollback."""
-    from master.coupling.bond import impedance_end, mobility_end
+    from master.coupling.end import impedance_end, mobility_end
     from master.coupling.energy_consistent import EnergyConsistent
     from master.coupling.hang_off import hang_off
     from master.fmu.instance import Fmu

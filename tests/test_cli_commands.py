@@ -16,10 +16,9 @@ import pytest
 
 from master.__main__ import main
 from master.coupling.ledger import EnergyCheckFailed
-from master.fmu.instance import FmuFailed, StepRejected
-from master.run import prepared
-from master.run import simulate as run
-from master.run.drive import Cost, pose_gap, top_tension
+from master.fmu.errors import FmuFailed, StepRejected
+from master.run import prepared, simulate
+from master.run.pipe_drive import Cost, pose_gap, top_tension
 from master.run.warnings import Remarks
 from master.scene import keys
 from master.scene.reading import FOUND, from_mapping, load
@@ -87,8 +86,8 @@ class StillDrive:
 @pytest.fixture
 def still(monkeypatch):
     def arrange(fate="nothing"):
-        monkeypatch.setattr(run, "prepare", lambda scene: None)
-        monkeypatch.setattr(run, "open_drive", lambda sections, fmus: nullcontext(StillDrive(fate)))
+        monkeypatch.setattr(simulate, "prepare", lambda scene: None)
+        monkeypatch.setattr(simulate, "open_drive", lambda sections, fmus: nullcontext(StillDrive(fate)))
 
     return arrange
 
@@ -124,7 +123,7 @@ def test_shapes_are_recorded_once_a_step_at_most_and_by_default(still, tmp_path)
         assert len(shapes["t"]) == 21
     scene = load("paper", SHORT[1::2])
     mapping = scene.mapping | {"simulation": {"duration": 2.0, "macro_step": 0.1}}
-    result = run.simulate(from_mapping(mapping, "paper"), tmp_path / "b", io.StringIO())
+    result = simulate.simulate(from_mapping(mapping, "paper"), tmp_path / "b", io.StringIO())
     assert result.summary["stretch_m"] == pytest.approx(0.1)
     with np.load(tmp_path / "b" / "shapes.npz") as shapes:
         np.testing.assert_allclose(shapes["t"], (0.0, 0.5, 1.0, 1.5, 2.0))
@@ -279,8 +278,8 @@ def test_an_fmu_that_swallows_the_interruption_while_loading_is_interrupted_all_
         except KeyboardInterrupt:
             raise FmuFailed("Pipe: cannot be loaded") from None
 
-    monkeypatch.setattr(run, "prepare", lambda scene: None)
-    monkeypatch.setattr(run, "open_drive", swallow)
+    monkeypatch.setattr(simulate, "prepare", lambda scene: None)
+    monkeypatch.setattr(simulate, "open_drive", swallow)
     assert main(["run", "-o", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err == "pipelay: interrupted\n"
     assert list(tmp_path.iterdir()) == []
@@ -292,10 +291,10 @@ def test_an_interruption_that_the_loading_swallows_ends_the_run_after_its_first_
             os.kill(os.getpid(), signal.SIGINT)
 
     still()
-    monkeypatch.setattr(run, "prepare", swallow)
+    monkeypatch.setattr(simulate, "prepare", swallow)
     assert main(["run", *SHORT, "-o", str(tmp_path)]) == 1
     assert "interrupted at 0.1 s of 2 s" in capsys.readouterr().out
-    monkeypatch.setattr(run, "prepare", lambda _: None)
+    monkeypatch.setattr(simulate, "prepare", lambda _: None)
     assert main(["run", *SHORT, "-o", str(tmp_path)]) == 0  # and no other run
 
 
@@ -317,8 +316,8 @@ def test_progress_is_shown_on_a_terminal_only(still, tmp_path):
     still()
     scene = load("paper", SHORT[1::2])
     terminal, pipe = Terminal(), io.StringIO()
-    run.simulate(scene, tmp_path / "a", terminal)
-    run.simulate(scene, tmp_path / "b", pipe)
+    simulate.simulate(scene, tmp_path / "a", terminal)
+    simulate.simulate(scene, tmp_path / "b", pipe)
     assert "s simulated" in terminal.getvalue()
     assert pipe.getvalue() == ""
 

@@ -10,13 +10,14 @@ import pytest
 
 from master import commands
 from master.__main__ import main
-from master.coupling.bond import FmuEnd, mobility_end
+from master.coupling.end import FmuEnd, mobility_end
 from master.coupling.ledger import EnergyCheckFailed
-from master.fmu.instance import Fmu, FmuFailed
-from master.run import drive
-from master.run.drive import open_drive
+from master.fmu.errors import FmuFailed
+from master.fmu.instance import Fmu
+from master.run import pipe_drive
+from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
-from master.scene import reading as scene
+from master.scene import reading
 
 EXPORTED = (
     "pipe.fmu", "vessel.fmu", "system.ssp", "OspSystemStructure.xml", "OspSystemStructure_ecco.xml", "Pipe_OspModelDescription.xml",
@@ -28,7 +29,7 @@ BUSY = ["environment.current.start=0", "environment.current.ramp=4", "vessel.con
 
 def marched(name, changes, macro_step, duration):
     """Rows of the ledger (steps + 1, columns) by name, after a run of `duration`."""
-    loaded = scene.load(name, [*changes, f"simulation.duration={duration}", f"simulation.macro_step={macro_step}",
+    loaded = reading.load(name, [*changes, f"simulation.duration={duration}", f"simulation.macro_step={macro_step}",
                                f"simulation.recording_step={duration}"])  # fmt: skip
     with open_drive(loaded.sections, prepare(loaded)) as moving:
         rows = [moving.ledger.row]
@@ -77,7 +78,7 @@ def test_a_wrong_connection_fails_the_energy_check_with_exit_code_1(monkeypatch,
         good.__class__, good.wrong = Sabotaged, wrong
         return good
 
-    monkeypatch.setattr(drive, "mobility_end", connect)
+    monkeypatch.setattr(pipe_drive, "mobility_end", connect)
     changes = [f"--set={change}" for change in ("simulation.duration=5", "simulation.recording_step=1", *BUSY)]
     assert main(["run", *changes, "-o", str(tmp_path)]) == 1
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -94,7 +95,7 @@ def test_a_load_from_a_table_does_the_work_that_it_gives(tmp_path):
 
 
 def test_a_prescribed_top_goes_exactly_where_it_should():
-    loaded = scene.load("heave", ["simulation.duration=4", "simulation.recording_step=4", "top_motion.ramp=0"])
+    loaded = reading.load("heave", ["simulation.duration=4", "simulation.recording_step=4", "top_motion.ramp=0"])
     with open_drive(loaded.sections, prepare(loaded)) as moving:
         while moving.time < 4.0:
             moving.advance(4.0)
@@ -107,7 +108,7 @@ def test_a_prescribed_top_goes_exactly_where_it_should():
 
 def test_a_prescribed_top_is_watched_too():
     """A pipe that reports half the work done on it does not go unseen."""
-    loaded = scene.load("heave", ["simulation.duration=4", "simulation.recording_step=4"])
+    loaded = reading.load("heave", ["simulation.duration=4", "simulation.recording_step=4"])
     with open_drive(loaded.sections, prepare(loaded)) as moving:
         pipe = moving.units["pipe"]
         honest = pipe.get
@@ -133,10 +134,10 @@ def test_export_writes_fmus_that_start_in_the_equilibrium(tmp_path, capsys):
     assert main(["export", "-o", str(tmp_path)]) == 0
     assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in EXPORTED]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(EXPORTED)
-    loaded = scene.load("paper")
+    loaded = reading.load("paper")
     exported = {name: tmp_path / f"{name}.fmu" for name in ("pipe", "vessel")}
     with open_drive(loaded.sections, exported) as moving:
-        gap = drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
+        gap = pipe_drive.pose_gap(moving.units["pipe"], moving.units["vessel"])
         assert max(gap.values()) < 1e-9
 
 
@@ -163,14 +164,14 @@ def test_an_export_leaves_nothing_of_another_scenes_and_an_interrupted_one_nothi
 @pytest.mark.parametrize("damping", ["internal", "numerical"])
 def test_a_damping_that_the_pipe_has_no_output_for_is_refused(damping):
     """Its energy would be missing from the balance."""
-    with Fmu(prepare(scene.load("paper"))["pipe"], "pipe") as pipe:
+    with Fmu(prepare(reading.load("paper"))["pipe"], "pipe") as pipe:
         reason = f"^pipe: initialisation: {damping}_damping: adds the output {damping}_dissipation; such an FMU must be exported anew$"
         with pytest.raises(FmuFailed, match=reason):
             pipe.initialize({f"{damping}_damping": 0.05})
 
 
 def test_an_exported_pipe_of_another_length_gets_new_nodes_where_its_own_are_dropped():
-    exported = prepare(scene.load("paper"))["pipe"]
+    exported = prepare(reading.load("paper"))["pipe"]
     with Fmu(exported, "pipe") as pipe, pytest.raises(FmuFailed, match=r"length 1210 m; an empty one places the nodes anew"):
         pipe.initialize({"length": 1210.0})
     with Fmu(exported, "pipe") as pipe:
@@ -182,7 +183,7 @@ def test_an_exported_pipe_of_another_length_gets_new_nodes_where_its_own_are_dro
 @pytest.mark.parametrize("unit", ["pipe", "vessel"])
 def test_a_rollback_is_bitwise_and_cheap(unit):
     """All outputs, after a live and after a serialised state; saving, restoring and freeing cost less than half a step."""
-    loaded = scene.load("paper", BUSY)
+    loaded = reading.load("paper", BUSY)
     fmu_file = prepare(loaded)[unit]
     with Fmu(fmu_file, unit) as fmu:
         fmu.initialize()

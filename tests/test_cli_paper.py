@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from master.__main__ import main
-from master.scene import reading as scene
+from master.scene import reading
 from master.with_units.monolithic import march
 from pipe_fmu import Pipe
 
@@ -77,7 +77,7 @@ def together():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Pipe, "step", counted)
-        *_, last = march(scene.load("paper"))[2]
+        *_, last = march(reading.load("paper"))[2]
     return last, corrections
 
 

@@ -26,7 +26,8 @@ from units.toys import SPRING, build_pair
 
 from master.__main__ import main
 from master.fmi import build, cache
-from master.fmi.build import build_fmu, cache_folder, cached_fmu
+from master.fmi.build import build_fmu, cached_fmu
+from master.fmi.cache import cache_folder
 from master.process import screen
 from master.process.folders import taken
 from master.results import figures
@@ -211,7 +212,8 @@ class Plain(Fmi2Slave):
 """
 STEPPED = """
 import sys
-from master.fmu.instance import Fmu, FmuFailed
+from master.fmu.errors import FmuFailed
+from master.fmu.instance import Fmu
 try:
     with Fmu(sys.argv[1]) as fmu:
         fmu.initialize()

@@ -8,8 +8,8 @@ from master.coupling.bond import Bond, Pair
 from master.coupling.one_sided import OneSided
 from master.coupling.predicted_end import PredictedEnd
 from master.coupling.scheme import CouplingFailed
-from master.fmi.build import cache_folder
-from master.run.drive import open_drive, pose_gap
+from master.fmi.cache import cache_folder
+from master.run.pipe_drive import open_drive, pose_gap
 from master.run.prepared import prepare
 from master.scene.reading import load
 from master.studies.stability import bodies, study

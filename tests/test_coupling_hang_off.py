@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from master.run.drive import open_drive, pose_gap
+from master.run.pipe_drive import open_drive, pose_gap
 from master.run.prepared import prepare
-from master.scene import reading as scene
+from master.scene import reading
 from master.with_units.monolithic import march
 
 SMALL = ["pipe.nodes=12", "simulation.recording_step=100", "simulation.snapshots=[]"]
@@ -13,7 +13,7 @@ MOVED = ["environment.current.start=0", "environment.current.ramp=2", "vessel.co
 
 
 def moving(name, changes, step, duration):
-    return scene.load(name, [*SMALL, *changes, f"simulation.macro_step={step}", f"simulation.duration={duration}"])
+    return reading.load(name, [*SMALL, *changes, f"simulation.macro_step={step}", f"simulation.duration={duration}"])
 
 
 def test_two_turns_of_yaw_and_a_roll_of_sixty_degrees_leave_no_gap_and_a_closed_ledger():

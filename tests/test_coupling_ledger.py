@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from units.toys import BODY_COLUMNS, SPRING_COLUMNS, build_pair, tied
 
-from master.coupling.bond import FmuEnd
+from master.coupling.end import FmuEnd
 from master.coupling.ledger import Columns, EnergyCheckFailed, Ledger
 from master.coupling.scheme import Step
-from master.fmu.instance import Fmu, FmuFailed
+from master.fmu.errors import FmuFailed
+from master.fmu.instance import Fmu
 
 PUSH = {"start_velocity": [1.0, 0.5, 0.0]}
 

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from units.toys import build_pair, tied
 
-from master.coupling.bond import Bond, Pair, impedance_end, mobility_end
+from master.coupling.bond import Bond, Pair
 from master.coupling.choose import coupling
+from master.coupling.end import impedance_end, mobility_end
 from master.coupling.energy_consistent import EnergyConsistent
 from master.coupling.hang_off import hang_off
 from master.coupling.linearly_implicit import History, LinearlyImplicit
 from master.coupling.predictor import Extrapolation
 from master.coupling.scheme import CouplingFailed, Step
-from master.fmu.instance import STEP_FAILURES
+from master.fmu.errors import STEP_FAILURES
 
 PUSH = {"start_velocity": [1.0, 0.5, 0.0], "start_rotation": [0.0, 0.2, -0.1]}
 

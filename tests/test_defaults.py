@@ -8,10 +8,10 @@ import pytest
 
 from master.__main__ import main
 from master.errors import UsageError
-from master.run.drive import top_tension
+from master.run.pipe_drive import top_tension
 from master.scene import keys, physics
-from master.scene import remarks as scene_remarks
 from master.scene.reading import BUILT_IN, DEFAULTS, from_mapping, load
+from master.scene.remarks import CONTROLLER
 from master.scene.sections import Simulation, TopMotion
 from master.with_units.statics import equilibrium
 from pipe_fmu.slave import PipeUnit
@@ -125,7 +125,7 @@ def test_a_key_that_contradicts_its_scene_is_refused(name, changes, message):
 
 
 def test_the_remarks_know_the_defaults_of_the_controller():
-    assert {key: getattr(Controller(), key) for key in scene_remarks.CONTROLLER} == scene_remarks.CONTROLLER
+    assert {key: getattr(Controller(), key) for key in CONTROLLER} == CONTROLLER
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from master.run.drive import pose_gap, top_tension
+from master.run.pipe_drive import pose_gap, top_tension
 
 
 class Ports:

@@ -13,7 +13,8 @@ import pytest
 from units.toys import SPRING, spring_recipe
 
 from master.fmi import build, entry, loader
-from master.fmi.build import build_fmu, cache_folder, cached_fmu
+from master.fmi.build import build_fmu, cached_fmu
+from master.fmi.cache import cache_folder
 
 PROGRAM = """
 import sys

@@ -19,9 +19,11 @@ from units.spring_fmu.parameters import Failure
 from units.toys import BODY, SPRING, build_pair, spring_recipe
 
 from master.fmi import licenses
-from master.fmi.build import Recipe, build_fmu, bundled_package, cache_folder, cached_fmu
+from master.fmi.build import Recipe, build_fmu, bundled_package, cached_fmu
+from master.fmi.cache import cache_folder
 from master.fmi.description import base_unit
-from master.fmu.instance import Fmu, FmuError, FmuFailed, StepFailed, StepRejected
+from master.fmu.errors import FmuError, FmuFailed, StepFailed, StepRejected
+from master.fmu.instance import Fmu
 
 FAILING = {"failure": {"above": 1e9}, "sections": [{"share": 0.5, "name": "a <b> & 'c'"}]}
 FLOWS, EFFORTS = ("velocity", "angular_velocity"), ("force", "moment")
@@ -401,7 +403,8 @@ def test_no_file_and_no_fmu_are_refused(tmp_path):
 
 PROGRAM = """
 import sys, glob
-from master.fmu.instance import Fmu, FmuFailed
+from master.fmu.errors import FmuFailed
+from master.fmu.instance import Fmu
 fmus = [Fmu(sys.argv[1], f"s{i}") for i in range(6)]
 for fmu in fmus:
     for _ in range(3):

@@ -26,7 +26,8 @@ from master.__main__ import main
 from master.fmi.build import Recipe, build_fmu, bundled_package
 from master.fmi.description import base_unit
 from master.fmi.system import CHANGES, OMS, SSC, SSD, WIRES, Wire
-from master.fmu.instance import Fmu, FmuFailed
+from master.fmu.errors import FmuFailed
+from master.fmu.instance import Fmu
 from pipe_fmu.step.state import PipeState
 
 STEP = 0.1

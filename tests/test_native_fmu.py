@@ -20,7 +20,8 @@ from toy_face import compiled
 
 from master.__main__ import main
 from master.fmi.native import windows, zig
-from master.fmu.instance import Fmu, FmuFailed, StepRejected
+from master.fmu.errors import FmuFailed, StepRejected
+from master.fmu.instance import Fmu
 from master.run.prepared import prepare
 from master.scene import reading
 

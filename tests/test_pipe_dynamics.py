@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from pipe_helpers import HANGING, TANGENT, TANGENT_ATTITUDE, balance, heave_case, march, started
-from pipe_helpers import rotation as frame
+from pipe_helpers import HANGING, TANGENT, TANGENT_ATTITUDE, balance, heave_case, march, rotation, started
 
 from pipe_fmu import AddedMass, PipeParameters, Section
 from pipe_fmu.environment import Environment
@@ -140,10 +139,10 @@ def test_added_mass_is_that_of_the_displaced_water_across_and_nothing_along():
     parameters = heave_case(nodes=16, added_mass=AddedMass(0.7))
     pipe, _, state = started(parameters)
     v = np.array([0.4, 0.3, -0.2])
-    t1 = np.array([frame(q)[:, 0] for q in state.quaternion])
+    t1 = np.array([rotation(q)[:, 0] for q in state.quaternion])
     moving = state._replace(
         velocity=np.tile(v, (16, 1)),
-        added_mass_velocity=np.array([frame(q).T @ v for q in state.quaternion]),
+        added_mass_velocity=np.array([rotation(q).T @ v for q in state.quaternion]),
     )
     lengths = np.diff(pipe.s)
     share = 0.5 * (np.append(lengths, 0.0) + np.append(0.0, lengths))
@@ -156,7 +155,7 @@ def test_added_mass_is_that_of_the_displaced_water_across_and_nothing_along():
 def test_ten_turns_of_the_top_twist_the_line_by_ten_turns():
     """No rotation is lost past 180 degrees (an element takes less): torque GJ 20 pi / L everywhere, the top back in its attitude."""
     pipe, _, start = started(PipeParameters(top_position=TANGENT, top_quaternion=TANGENT_ATTITUDE, internal_damping=0.05))
-    axis = frame(TANGENT_ATTITUDE)[:, 0]
+    axis = rotation(TANGENT_ATTITUDE)[:, 0]
     state = start
     for k in range(250):
         rate = 20 * math.pi * max(math.cos(math.pi * k / 200) - math.cos(math.pi * (k + 1) / 200), 0.0) / 2 / 0.2
@@ -165,4 +164,4 @@ def test_ten_turns_of_the_top_twist_the_line_by_ten_turns():
         state = result.state
     torque = pipe.section_forces(state).moment[:, 0]
     np.testing.assert_allclose(torque, PipeParameters().section.stiffness[2] * 20 * math.pi / 1200, rtol=1e-3)
-    np.testing.assert_allclose(frame(state.quaternion[-1]), frame(TANGENT_ATTITUDE), atol=1e-12)
+    np.testing.assert_allclose(rotation(state.quaternion[-1]), rotation(TANGENT_ATTITUDE), atol=1e-12)

@@ -15,8 +15,7 @@ from pipe_fmu.line import Water
 from pipe_fmu.maths import block_tridiagonal
 from pipe_fmu.results import section_forces
 from pipe_fmu.statics import stability
-from pipe_fmu.step import newton
-from pipe_fmu.step import system as step_kernel
+from pipe_fmu.step import newton, system
 
 
 def test_elimination_exchanges_rows_where_a_pivot_would_vanish():
@@ -89,7 +88,7 @@ def test_a_line_bent_about_its_other_axis_has_the_same_moments_there(tension):
         position = turn.apply(np.vstack([np.zeros(3), np.cumsum(chords, axis=0)]))
         attitude = (turn * Rotation.from_euler("yz", np.column_stack([angle, 0.1 * angle])) * turn.inv()).as_quat(scalar_first=True)
         strain = np.empty((3, 7))
-        step_kernel.element_strains(line, position, attitude, strain)
+        system.element_strains(line, position, attitude, strain)
         found.append(section_forces.nodal_wrenches(line, mass, still, position, attitude, nothing, nothing, strain))
     (n1, n2, n3, m1, m2, m3), turned = found[0].T, found[1].T
     assert np.abs([m2, m3]).max(axis=1).min() > 100.0

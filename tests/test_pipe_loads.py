@@ -7,8 +7,7 @@ import pytest
 from pipe_helpers import rotation, rotation_vector_quaternion, times
 from reference_bvp import bed_reaction
 
-from pipe_fmu.element import assembly
-from pipe_fmu.element import strains as element
+from pipe_fmu.element import assembly, strains
 from pipe_fmu.environment import Current
 from pipe_fmu.loads import bed, current, drag
 
@@ -76,10 +75,10 @@ def test_element_on_the_bed_has_the_gradient_of_its_potential():
         a = times(rotation_vector_quaternion(x[3:6]), q1)
         b = times(rotation_vector_quaternion(x[9:12]), q2)
         chord = d + x[6:9] - x[0:3]
-        rm, u, psi = element.frame(tuple(a), tuple(b), tuple(chord))
+        rm, u, psi = strains.frame(tuple(a), tuple(b), tuple(chord))
         strain, rows = np.empty(7), np.empty((7, 9))
-        element.strains(rm, u, psi, np.dot(u, u) - h * h, h, share, strain)
-        element.gradients(rm, u, psi, h, share, rows)
+        strains.strains(rm, u, psi, np.dot(u, u) - h * h, h, share, strain)
+        strains.gradients(rm, u, psi, h, share, rows)
         points, wide = np.empty((4, 2)), np.empty(12)
         lies = on_bed(), 0, h, z1 + x[2], z1 + d[2] + x[8], strain[6]
         energy, on_sag = bed.press(*lies, points)
@@ -214,7 +213,7 @@ def test_drag_at_rest_is_zero_with_a_finite_derivative():
 
 def element_drag(ends, current, d=(10.0, 0.0, 0.0), q1=(1.0, 0.0, 0.0, 0.0), q2=(1.0, 0.0, 0.0, 0.0), rate=0.0):
     vector, matrix = np.zeros(12), np.zeros((12, 12))
-    rm, u, psi = element.frame(tuple(q1), tuple(q2), tuple(d))
+    rm, u, psi = strains.frame(tuple(q1), tuple(q2), tuple(d))
     levels = np.array([-800.0, 0.0])
     flow = np.array([current, current], dtype=float)
     power = drag.add_mean_drag(
@@ -262,7 +261,7 @@ def test_current_on_an_arc_is_that_at_the_depth_of_its_points():
     """An arc from -50 to -50 m that hangs 0.5 m below its chord, in a current that vanishes at -50 m: z + 50 = 2 x (1 - x) in it."""
     bend = np.array([0.0, 0.4, 0.0])
     ends = (rotation_vector_quaternion(sign * 0.5 * bend) for sign in (-1, 1))
-    frame = element.frame(*(tuple(q) for q in ends), (10.0, 0.0, 0.0))
+    frame = strains.frame(*(tuple(q) for q in ends), (10.0, 0.0, 0.0))
     levels, flow = np.array([-51.0, -49.0]), np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
     vector, matrix = np.zeros(12), np.zeros((12, 12))
     depths = np.array([-50.0, -50.0])

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from pipe_fmu.results import section_forces
-from pipe_fmu.step import system as step_kernel
+from pipe_fmu.step import system
 
 LENGTH, MASS, EA, GA, GJ, EI, TIME = 10.0, 2.0, 1e5, 1e9, 80.0, 100.0, 0.1  # TIME: of the internal damping
 INERTIA = np.array([0.4, 0.2, 0.2])
@@ -137,7 +137,7 @@ def section_wrenches(line, s, state):
     """Section forces and moments (n, 6), material, of a state; to the recovery the distributed load is an inertial force the more."""
     x, q, v, rate = state
     strain = np.empty((len(s) - 1, 7))
-    step_kernel.element_strains(line, x, q, strain)
+    system.element_strains(line, x, q, strain)
     mass = section_forces.MassPerLength(*np.full((2, len(s) - 1), MASS))
     return section_forces.nodal_wrenches(line, mass, STILL, x, q, v, rate, strain)
 

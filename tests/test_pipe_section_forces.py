@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import reference_bvp as reference
+import reference_bvp
 from pipe_helpers import HANGING, P16, SECTIONS, TANGENT, TANGENT_ATTITUDE, march, pitch, rotation, sea, started
 
 from pipe_fmu import PipeParameters, PipeUnit, Seabed
@@ -25,7 +25,7 @@ def test_section_forces_at_the_nodes_agree_with_the_boundary_value_problem(name,
     """Errors: tension 2e-5, shear 2e-3 (and attitudes of 3e-5), bending 3e-3 (P12, bending length 9 m), torque 1e-3."""
     pipe, _, state = started(clamped(name, current))
     got = pipe.section_forces(state)
-    solution = reference.solve(reference.TUBES[name], 1200.0, TANGENT[0], 800.0, ANGLE, current=current or 0.0)
+    solution = reference_bvp.solve(reference_bvp.TUBES[name], 1200.0, TANGENT[0], 800.0, ANGLE, current=current or 0.0)
     _, _, _, moment, tension, shear = solution.at(pipe.s)
     assert np.abs(got.tension - tension).max() < 2e-5 * tension.max()
     assert np.abs(got.shear.T - shear).max() < 3e-5 * tension.max() + 2e-3 * np.abs(shear).max()
@@ -57,7 +57,7 @@ def test_clamp_moments_agree_with_the_boundary_value_problem(name, mesh, error):
     """Also where equal elements are 2.6 times as long as the line bends in: their own end moments err by 5e-2."""
     pipe, _, state = started(clamped(name, 0.8, mesh=mesh))
     got = pipe.section_forces(state).moment
-    solution = reference.solve(reference.TUBES[name], 1200.0, TANGENT[0], 800.0, ANGLE, current=0.8)
+    solution = reference_bvp.solve(reference_bvp.TUBES[name], 1200.0, TANGENT[0], 800.0, ANGLE, current=0.8)
     moment = solution.at(pipe.s)[3].T
     largest = np.linalg.norm(moment[:, 1:], axis=1).max()
     for end in (0, -1):
@@ -68,7 +68,7 @@ def test_tension_on_a_straight_hanging_part_grows_with_the_weight():
     pipe, _, state = started(clamped("P16", None))
     tension = pipe.section_forces(state).tension
     height = -state.position[:, 2]
-    w = reference.TUBES["P16"].weight
+    w = reference_bvp.TUBES["P16"].weight
     inner = slice(8, -8)  # away from the clamps the shear carries nothing: dT = w dz
     np.testing.assert_allclose(np.diff(tension)[inner], w * np.diff(height)[inner], rtol=2e-3)
 
@@ -90,7 +90,7 @@ def test_largest_ports_are_the_largest_nodal_values_and_the_end_wrench_is_the_pu
 def test_stretched_length_is_the_length_under_the_mean_tension():
     """Fig. 4 of the paper: stretch = integral of T / EA, 0.12 m for P16."""
     pipe, _, state = started(clamped("P16", None))
-    tension = reference.solve(reference.TUBES["P16"], 1200.0, TANGENT[0], 800.0, ANGLE).at(np.linspace(0, 1200, 4001))[4]
+    tension = reference_bvp.solve(reference_bvp.TUBES["P16"], 1200.0, TANGENT[0], 800.0, ANGLE).at(np.linspace(0, 1200, 4001))[4]
     stretch = pipe.stretched_length(state) - 1200.0
     assert stretch == pytest.approx(tension.mean() * 1200.0 / P16.stiffness[0], rel=1e-3)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import reference_bvp as reference
+import reference_bvp
 from pipe_helpers import (
     HANGING,
     P16,
@@ -44,7 +44,7 @@ def line(name, distance, angle=None, current=None, **changes):
 
 
 def exact(name, distance, angle=None, current=0.0, **changes):
-    return reference.solve(reference.TUBES[name], LENGTH, distance, HEIGHT, angle, current=current, **changes)
+    return reference_bvp.solve(reference_bvp.TUBES[name], LENGTH, distance, HEIGHT, angle, current=current, **changes)
 
 
 def relative(value, truth):
@@ -67,7 +67,7 @@ def test_published_figures_of_the_peer_pipe_at_the_tangent_catenary():
 
 
 def test_the_reference_itself_reproduces_the_published_figures():
-    _, _, force, moment, _, _ = reference.solve(reference.PEER, LENGTH, TANGENT[0], HEIGHT, ANGLE).at([0.0, LENGTH])
+    _, _, force, moment, _, _ = reference_bvp.solve(reference_bvp.PEER, LENGTH, TANGENT[0], HEIGHT, ANGLE).at([0.0, LENGTH])
     np.testing.assert_allclose(force[:, 1], [500511.39, 0.0, -1202574.09], rtol=1e-8, atol=1e-6)
     np.testing.assert_allclose(moment[1], [220743.3, 29120.4], atol=0.06)  # the digits given
     assert force[2, 0] == pytest.approx(375.8, abs=0.06)
@@ -190,8 +190,8 @@ def test_weight_reactions_and_bed_balance():
     x, weights = np.polynomial.legendre.leggauss(4)
     x = 0.5 * (x + 1.0)
     z = state.position[:-1, 2, None] * (1 - x) + state.position[1:, 2, None] * x + state.strain[:, 6, None] * x * (1 - x)
-    w = reference.TUBES["P16"].weight
-    bed = float(np.sum(reference.bed_reaction(z, 0.4064, w) * weights * 0.5 * pipe.line.length[:, None]))
+    w = reference_bvp.TUBES["P16"].weight
+    bed = float(np.sum(reference_bvp.bed_reaction(z, 0.4064, w) * weights * 0.5 * pipe.line.length[:, None]))
     assert bed > 100.0 * w
     assert -found.top[2] - found.foot[2] + bed == pytest.approx(w * LENGTH, rel=1e-9)
 
@@ -200,7 +200,7 @@ def test_weight_reactions_and_bed_balance():
 def test_reactions_carry_the_submerged_weight(name):
     _, found, _ = line(name, TANGENT[0], ANGLE)
     reactions = found.top[:3] + found.foot[:3]
-    np.testing.assert_allclose(reactions, [0, 0, -reference.TUBES[name].weight * LENGTH], atol=1e-6 * -reactions[2])
+    np.testing.assert_allclose(reactions, [0, 0, -reference_bvp.TUBES[name].weight * LENGTH], atol=1e-6 * -reactions[2])
 
 
 def test_a_line_on_the_bed_from_the_foot_lies_at_zero():
@@ -216,7 +216,7 @@ def test_without_bending_stiffness_it_is_the_elastic_catenary():
     pipe, found, state = started(
         PipeParameters(section=section, foot="pinned", top="pinned", top_position=(780.0, 0.0, -800.0), top_quaternion=HANGING)
     )
-    w, axial = reference.TUBES["P16"].weight, section.stiffness[0]
+    w, axial = reference_bvp.TUBES["P16"].weight, section.stiffness[0]
 
     def shape(s, force, foot):
         x = force * s / axial + force / w * (np.arcsinh((foot + w * s) / force) - np.arcsinh(foot / force))
@@ -308,7 +308,7 @@ def test_nearly_vertical_pipe_agrees_with_the_boundary_value_problem():
     """J-lay: 850 m of pipe in 800 m of water, the top held at 89 degrees."""
     angle = math.radians(89.0)
     _, found, _ = started(PipeParameters(length=850.0, top_position=(100.0, 0.0, -800.0), top_quaternion=pitch(angle), seabed=Seabed()))
-    solution = reference.solve(reference.TUBES["P16"], 850.0, 100.0, 800.0, angle, bed=True, tolerance=1e-6)
+    solution = reference_bvp.solve(reference_bvp.TUBES["P16"], 850.0, 100.0, 800.0, angle, bed=True, tolerance=1e-6)
     assert found.stable
     assert relative(found.top[:3], solution.at([850.0])[2][:, 0]) < 1e-4
 

@@ -29,7 +29,7 @@ from pipe_helpers import (
 from pipe_fmu import AddedMass, PipeParameters, PipeUnit, Seabed
 from pipe_fmu.step import integrator
 from pipe_fmu.step import system as step_kernel
-from pipe_fmu.step.integrator import WORKS
+from pipe_fmu.step.state import WORKS
 
 TWO = (replace(P16, length=500.0), replace(P16, length=700.0, wall_thickness=0.0254, coating_thickness=0.02, coating_density=2000.0))
 BED = {"seabed": Seabed(damping=1.0, friction=0.5), "top_position": (780.0, 0.0, -800.0)}

@@ -11,9 +11,9 @@ import pytest
 from master.__main__ import main
 from master.errors import RunError, UsageError
 from master.run.warnings import Remarks
-from master.scene import reading as scene
-from master.scene import remarks as scene_remarks
-from master.with_units.statics import equilibrium, report
+from master.scene import reading, remarks
+from master.with_units.statics import equilibrium
+from master.with_units.statics_report import report
 from pipe_fmu import Pipe, PipeParameters, Section, validity
 from pipe_fmu.slave import PipeUnit
 from vessel_fmu.parameters import Start, VesselParameters
@@ -23,7 +23,7 @@ STILL = {"velocity": np.zeros(3), "angular_velocity": np.zeros(3), "mobility": n
 
 
 def started(name="heave", changes=()):
-    unit = PipeUnit(equilibrium(scene.load(name, changes)).pipe)
+    unit = PipeUnit(equilibrium(reading.load(name, changes)).pipe)
     assert unit.initialize(0.0, {}) is None
     return unit
 
@@ -58,7 +58,7 @@ def test_a_line_in_compression_is_remarked():
 
 
 def test_utilisation_is_the_stress_over_the_yield_stress_of_its_own_section():
-    parameters = equilibrium(scene.load("heave")).pipe
+    parameters = equilibrium(reading.load("heave")).pipe
     steel = parameters.section
     soft = (replace(steel, length=200.0, yield_stress=1e8), replace(steel, length=1000.0, yield_stress=5e8))
     pipe = Pipe(replace(parameters, sections=soft, nodes_at=(), nodes=49))
@@ -140,7 +140,7 @@ SLIPS = {
 def test_a_slip_of_units_is_remarked(name, change, words):
     """In the remarks of the equilibrium, or beside the reason why there is none."""
     try:
-        said = report(scene.load(name, [change]))["remarks"]
+        said = report(reading.load(name, [change]))["remarks"]
     except (RunError, UsageError) as error:
         said = [str(error)]
     assert any(words in text for text in said), said
@@ -172,7 +172,7 @@ SCENE = {
 
 @pytest.mark.parametrize(("name", "changes", "words"), SCENE.values(), ids=SCENE)
 def test_what_cannot_act_in_a_scene_is_remarked(name, changes, words):
-    found = scene_remarks.of(scene.load(name, changes))["scene"]
+    found = remarks.of(reading.load(name, changes))["scene"]
     assert any(text.startswith(words) for text in found), found
 
 
@@ -197,11 +197,11 @@ def test_every_key_of_a_section_acts_or_is_known_to_have_others_in_its_stead():
         return {name for name in names if derived(moved[name]) == derived(section)}
 
     assert not idle(tube)
-    for key, others in scene_remarks.INSTEAD.items():
+    for key, others in remarks.INSTEAD.items():
         assert key in idle(replace(tube, **{other: direct[other] for other in others}))
         for other in others:  # all of them are needed
             assert key not in idle(replace(tube, **{one: direct[one] for one in others if one != other}))
-    assert idle(replace(tube, **direct)) == set(scene_remarks.INSTEAD)
+    assert idle(replace(tube, **direct)) == set(remarks.INSTEAD)
 
 
 def test_remarks_that_differ_in_their_numbers_are_of_one_kind():

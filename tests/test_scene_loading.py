@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from master.scene import reading as scene
+from master.scene import reading
 from master.scene.reading import SceneError
 from master.scene.sections import Load, TopMotion, mean_load
 
@@ -33,12 +33,12 @@ def file(tmp_path):
 
 @pytest.mark.parametrize("name", ["paper", "pipelay", "free-decay", "heave"])
 def test_built_in_scenes_are_listed_and_load(name):
-    assert scene.built_in()[name]
-    assert scene.load(name).name == name
+    assert reading.built_in()[name]
+    assert reading.load(name).name == name
 
 
 def test_a_change_replaces_one_value_and_may_add_a_table():
-    changed = scene.load("paper", ["simulation.duration=60", "vessel.controller.x = 790.0", "pipe.seabed={}"])
+    changed = reading.load("paper", ["simulation.duration=60", "vessel.controller.x = 790.0", "pipe.seabed={}"])
     assert changed.sections.simulation.duration == 60.0
     assert changed.mapping["vessel"]["controller"] == {"x": 790.0, "y": 0.0, "start": 30.0}
     assert changed.mapping["pipe"]["seabed"] == {}
@@ -47,7 +47,7 @@ def test_a_change_replaces_one_value_and_may_add_a_table():
 
 @pytest.mark.parametrize("change", ["simulation.duration=5", "simulation.recording_step=0.01", "simulation.recording_step=1e3"])
 def test_one_change_of_the_duration_or_the_recording_is_enough(change):
-    scene.load("paper", [change])
+    reading.load("paper", [change])
 
 
 BAD_CHANGES = {
@@ -76,16 +76,16 @@ BAD_CHANGES = {
 }
 
 
-@pytest.mark.parametrize("key", scene.FOUND)
+@pytest.mark.parametrize("key", reading.FOUND)
 def test_what_the_equilibrium_sets_is_refused_in_a_scene(key):
     with pytest.raises(SceneError, match=rf"^{key}: .*; must be absent$"):
-        scene.load("paper", [f"{key}=[1.0, 2.0, 3.0]"])
+        reading.load("paper", [f"{key}=[1.0, 2.0, 3.0]"])
 
 
 @pytest.mark.parametrize(("change", "named", "rule"), BAD_CHANGES.values(), ids=BAD_CHANGES)
 def test_a_bad_change_is_named_in_one_line(change, named, rule):
     with pytest.raises(SceneError) as caught:
-        scene.load("paper", [change])
+        reading.load("paper", [change])
     message = str(caught.value)
     assert named in message
     assert rule in message
@@ -112,7 +112,7 @@ BAD_FILES = {
 @pytest.mark.parametrize(("content", "name", "rule"), BAD_FILES.values(), ids=BAD_FILES)
 def test_a_bad_file_is_named_in_one_line(file, content, name, rule):
     with pytest.raises(SceneError) as caught:
-        scene.load(file(content, name))
+        reading.load(file(content, name))
     assert rule in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -121,18 +121,18 @@ def test_a_file_that_is_no_text_is_refused(tmp_path):
     path = tmp_path / "binary.toml"
     path.write_bytes(b"title = \xff\xfe")
     with pytest.raises(SceneError, match="must be UTF-8"):
-        scene.load(str(path))
+        reading.load(str(path))
 
 
 @pytest.mark.parametrize("name", ["missing.toml", "no/such/folder/scene.toml"])
 def test_a_missing_file_is_named(name):
     with pytest.raises(SceneError, match=r"scene = '.*toml': no such file"):
-        scene.load(name)
+        reading.load(name)
 
 
 def test_a_misspelt_built_in_name_gets_the_nearest_one():
     with pytest.raises(SceneError, match=r"scene = 'papr': unknown built-in scene \(did you mean paper\?\)"):
-        scene.load("papr")
+        reading.load("papr")
 
 
 def test_mean_velocities_add_up_to_the_displacement():

@@ -10,12 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from master.__main__ import main
 from master.errors import RunError, UsageError
-from master.run.drive import open_drive
+from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
-from master.scene import reading as scene
+from master.scene import reading
 from master.scene.reading import from_mapping
 from master.with_units.monolithic import march
-from master.with_units.statics import equilibrium, released, report
+from master.with_units.statics import equilibrium, released
+from master.with_units.statics_report import report
 from vessel_fmu.vessel import Vessel
 
 STEEL = {"outer_diameter": 0.4064, "wall_thickness": 0.025}
@@ -102,14 +103,14 @@ def test_a_held_top_is_pitched_first_and_then_turned_to_its_heading():
 )
 def test_a_vessel_on_a_fine_mesh_finds_the_equilibrium_of_a_coarse_one(nodes, hang_off, yaw):
     changes = [f"vessel.hang_off={hang_off}", f"start.yaw={yaw}"]
-    fine, coarse = (equilibrium(scene.load("paper", [*changes, f"pipe.nodes={n}"])).vessel.start for n in (nodes, 100))
+    fine, coarse = (equilibrium(reading.load("paper", [*changes, f"pipe.nodes={n}"])).vessel.start for n in (nodes, 100))
     assert_allclose(fine.position, coarse.position, atol=1e-3)
     assert_allclose(fine.attitude, coarse.attitude, atol=1e-5)
 
 
 def test_a_vessel_that_cannot_be_balanced_is_refused(monkeypatch):
     """A lift that jumps by a millionth of the pull where it would balance it: 3e-7 of it are left, up or down."""
-    loaded, load = scene.load("paper", ["pipe.nodes=400", "vessel.hang_off=[-40, 5, 5]"]), Vessel.static_load
+    loaded, load = reading.load("paper", ["pipe.nodes=400", "vessel.hang_off=[-40, 5, 5]"]), Vessel.static_load
     height = equilibrium(loaded).vessel.start.position[2]
 
     def unbalanced(vessel, position, *arguments):
@@ -147,7 +148,7 @@ def test_a_scene_without_a_simulation_is_not_run_and_says_in_one_line_what_to_gi
 def test_a_pipe_alone_without_a_motion_is_held_at_its_top(alone):
     """At rest in still water; pushed by a current that comes later, with no work at the top."""
     for changes, moves in (([], False), (["environment.current={velocity=[0, 0.8, 0], start=0.5}"], True)):
-        loaded = scene.load(alone, ["simulation={duration=3, macro_step=0.1}", *changes])
+        loaded = reading.load(alone, ["simulation={duration=3, macro_step=0.1}", *changes])
         with open_drive(loaded.sections, prepare(loaded)) as drive:
             pipe = drive.units["pipe"]
             top, nodes = pipe.get("top_position"), pipe.get("node_position")
@@ -166,7 +167,7 @@ def test_a_load_in_the_axes_of_the_hull_turns_with_it_and_keeps_the_energy():
     changes = ["pipe.nodes=12", "simulation.duration=4", "simulation.recording_step=9", "simulation.snapshots=[]"]
     ends = {}
     for frame, yaw in (("b", 0.0), ("e", 0.0), ("b", 1.5)):
-        loaded = scene.load("free-decay", [*changes, f"tables={{environment={rows}, frame='{frame}'}}", f"start.yaw={yaw}"])
+        loaded = reading.load("free-decay", [*changes, f"tables={{environment={rows}, frame='{frame}'}}", f"start.yaw={yaw}"])
         with open_drive(loaded.sections, prepare(loaded)) as drive:
             while drive.time < 4.0:
                 drive.advance(4.0)
@@ -177,7 +178,7 @@ def test_a_load_in_the_axes_of_the_hull_turns_with_it_and_keeps_the_energy():
     assert_allclose(ends["b", 0.0], ends["e", 0.0], atol=2e-3)
     assert ends["b", 1.5][1] > 0.9 * ends["b", 0.0][1] > 0.0
     with pytest.raises(UsageError, match="must be one of"):
-        scene.load("free-decay", [f"tables={{environment={rows}, frame='n'}}"])
+        reading.load("free-decay", [f"tables={{environment={rows}, frame='n'}}"])
 
 
 def test_a_released_vessel_starts_by_so_much_deeper_rolled_and_pitched_and_the_pipe_hangs_from_there():

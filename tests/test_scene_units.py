@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from master.errors import UsageError
-from master.scene import reading as scene
-from master.with_units.statics import equilibrium, report
+from master.scene import reading
+from master.with_units.statics import equilibrium
+from master.with_units.statics_report import report
 
 BAD_VALUES = {
     "unknown key": ("pipe.section.diameter=0.4", "pipe.section.diameter = 0.4", "unknown key"),
@@ -53,7 +54,7 @@ BAD_VALUES = {
 
 @pytest.mark.parametrize(("change", "named", "rule"), BAD_VALUES.values(), ids=BAD_VALUES)
 def test_a_bad_value_is_named_in_one_line(change, named, rule):
-    loaded = scene.load("paper", [change])
+    loaded = reading.load("paper", [change])
     with pytest.raises(UsageError) as caught:
         equilibrium(loaded)
     message = str(caught.value)
@@ -65,7 +66,7 @@ def test_a_bad_value_is_named_in_one_line(change, named, rule):
 
 def test_sections_have_from_the_common_section_what_they_do_not_say_themselves():
     changes = ["pipe.section.density=7000", "pipe.sections=[{length=300, density=7500}, {length=900}]", "pipe.nodes=12"]
-    at = equilibrium(scene.load("paper", changes))
+    at = equilibrium(reading.load("paper", changes))
     lower, upper = at.pipe.sections
     assert (lower.density, upper.density) == (7500.0, 7000.0)
     assert lower.outer_diameter == upper.outer_diameter == 0.4064
@@ -75,14 +76,14 @@ def test_sections_have_from_the_common_section_what_they_do_not_say_themselves()
 def test_the_touchdown_is_that_of_the_section_that_lifts_off():
     """A thick first section lies higher on the bed than the pipe that leaves it at z = -d / 8."""
     thick = "{length=20, outer_diameter=1.2, wall_thickness=0.06}"
-    found = report(scene.load("heave", ["pipe.seabed={}", f"pipe.sections=[{thick}, {{length=1180}}]", "start.x=780", "pipe.nodes=96"]))
+    found = report(reading.load("heave", ["pipe.seabed={}", f"pipe.sections=[{thick}, {{length=1180}}]", "start.x=780", "pipe.nodes=96"]))
     s, z = np.array(found["s_m"]), np.array(found["position_e_m"])[:, 2]
     assert found["touchdown_s_m"] > 20.0
     assert np.interp(found["touchdown_s_m"], s, z) == pytest.approx(-0.125 * 0.4064, rel=1e-9)
 
 
 def test_the_report_has_the_bending_between_nodes_the_touchdown_between_nodes_and_no_round_off():
-    found = report(scene.load("pipelay", ["start.x=780"]))
+    found = report(reading.load("pipelay", ["start.x=780"]))
     assert found["largest_bending_moment_N_m"] >= max(found["bending_moment_N_m"])
     s, z = np.array(found["s_m"]), np.array(found["position_e_m"])[:, 2]
     assert np.interp(found["touchdown_s_m"], s, z) == pytest.approx(-0.125 * 0.4064, rel=1e-9)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from master.fmi.build import cache_folder
+from master.fmi.cache import cache_folder
 from master.studies.stability import bodies, limits, published, study
 from master.studies.stability.units.body_fmu.slave import Body, BodyUnit
 from master.studies.stability.units.linear_fmu.exact import transition

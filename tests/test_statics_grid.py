@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import reference_bvp as reference
+import reference_bvp
 from pipe_helpers import pitch, rotation, started
 from statics_grid import equilibrium, scenes
 
@@ -32,10 +32,10 @@ def solution(number, top_angle=None):
     """Boundary value problem of a scene; the reference must meet its own end conditions."""
     p = SCENES[number].parameters
     x, _, z = p.top_position
-    tube = reference.TUBES[TUBES[SCENES[number].name.split(": ")[1].split(",")[0]]]
+    tube = reference_bvp.TUBES[TUBES[SCENES[number].name.split(": ")[1].split(",")[0]]]
     current = p.environment.current
     speed = 0.0 if current is None else current.velocity[1]
-    found = reference.solve(tube, p.length, x, -z, top_angle, p.foot, speed, p.environment.depth, p.seabed is not None, 1e-6)
+    found = reference_bvp.solve(tube, p.length, x, -z, top_angle, p.foot, speed, p.environment.depth, p.seabed is not None, 1e-6)
     ends = found.at([0.0, p.length])[0]
     np.testing.assert_allclose(ends, np.array([[0.0, 0.0, 0.0], p.top_position]).T, atol=1e-5 * p.length)
     return found

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-import reference_bvp as reference
+import reference_bvp
 from pipe_helpers import STILL, bar, pitch, started
 from statics_grid import differences, figures
 from steep_lines import equilibrium, least_advance, lines
@@ -12,7 +12,7 @@ from steep_lines import equilibrium, least_advance, lines
 from pipe_fmu import Pipe, PipeParameters, PipeUnit, Section
 from pipe_fmu.environment import Environment
 from pipe_fmu.native import MESSAGES
-from pipe_fmu.statics import solve as statics
+from pipe_fmu.statics import solve
 from pipe_fmu.statics.balance import Scales
 from pipe_fmu.step import integrator
 
@@ -29,7 +29,7 @@ PLUMB = PipeParameters(
 @pytest.mark.parametrize("nodes", [24, 48, 96, 192])
 def test_a_line_pinned_a_millimetre_aside_of_plumb_is_that_of_the_boundary_value_problem(nodes):
     """1000 m hang from the top and 200 m from the foot: 1.00 and 0.20 MN."""
-    found = reference.solve(reference.Tube(0.4064, 0.025), 1200.0, 0.001, 800.0, foot="pinned", tolerance=1e-6)
+    found = reference_bvp.solve(reference_bvp.Tube(0.4064, 0.025), 1200.0, 0.001, 800.0, foot="pinned", tolerance=1e-6)
     _, _, _, _, tension, _ = found.at([0.0, 1200.0])
     moment = np.abs(found.at(np.linspace(0.0, 1200.0, 5001))[3]).max()
     pipe, held = equilibrium(PLUMB, nodes)
@@ -59,7 +59,7 @@ def soft_in_shear(angle):
 @pytest.mark.parametrize(("angle", "flaw"), [(80.0, ""), (100.0, "turned inside out")])
 def test_an_equilibrium_with_a_chord_against_its_sections_is_none(angle, flaw):
     line, *pose = soft_in_shear(angle)
-    found = statics.equilibrium(line, STILL, Scales(line), tuple(pose))
+    found = solve.equilibrium(line, STILL, Scales(line), tuple(pose))
     assert found.residual < 1e-7
     assert found.flaw == flaw
     assert found.converged == (not flaw)

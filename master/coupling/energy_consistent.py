@@ -12,24 +12,24 @@ what it is given. The step is accepted when the bond makes no energy. With F = -
 Z and Y follow the ends' ports, where there are such, which makes the iteration Newton's; else Z follows Broyden's update,
 and difference quotients after four rounds. Both ends hold the same V_new, so there is no kinematic gap.
 
-An impedance end that can yield (see `master.coupling.bond.FmuEnd.meet`) takes V_free and Y, which that end's `derivative` gives at the
-extrapolated f, and solves for V and f at once, within its own Newton iteration. Where the mobility end answers that f with the same V to
-round-off, as it does where it is nearly linear over the error of the extrapolation, the step is done, with one solve of the impedance end.
-Else V_free and Y are taken anew at the f found, and one more solve, with the V that the mobility end answers, confirms it. Without
-yielding the second round is exact where f is linear in V, and two solves make a step; one does where nothing happens, and more where the
-extrapolation fails.
+An impedance end that can yield (see `master.coupling.end.FmuEnd.meet`) takes V_free and Y at the extrapolated f and finds V and f at once,
+within its own Newton iteration. If the mobility end answers this f with the same V to round-off, as it does where it is nearly linear over
+the error of the extrapolation, the step is done, with one solve of the impedance end. Else V_free and Y are taken anew at this f, and
+one more solve, with the V that the mobility end answered, confirms it. Without yielding, two solves make a step where f is linear in V,
+one where nothing happens, more where the extrapolation fails.
 
-A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one, and grows again after a
-few easy steps; a step after which an FMU is in error or answers with NaN is tried again once, with half the length. No step is halved where
-an FMU takes but one length. A tolerance below the round-off of the ends' answers is met to that round-off: a residual that no longer falls
-is then accepted.
+A step that is not accepted, or that an FMU discards, is tried again with half the length, down to a smallest one; the length grows again
+after a few easy steps. A step that leaves an FMU in error, or is answered with NaN, is halved once only, and none is where an FMU takes but
+one length. A tolerance below the round-off of the ends' answers is met to that round-off: a residual that no longer falls is accepted.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ..fmu.instance import StepFailed, StepRejected
+from ..fmu.errors import StepFailed, StepRejected
 from .bond import Bond, Matrix, Vector
 from .predictor import Extrapolation
 from .scheme import SLIVER, Check, Counters, CouplingFailed, End, Step, accept
@@ -43,6 +43,15 @@ FORESEEN = 0.1  # of the tolerance: a defect this small needs no better effort b
 EASY = 3  # rounds of an easy step
 PATIENCE = 4  # easy steps in a row after which a halved step grows
 SMALLEST_STEP = 2.0**-12  # of the macro step
+
+
+class _Point(NamedTuple):
+    """Where a round starts: flow, effort, and the flow `free` of the mobility end's law, free + Y f."""
+
+    flow: Vector
+    effort: Vector
+    free: Vector
+    answered: bool  # whether the effort is the impedance end's answer to the flow
 
 
 class EnergyConsistent:
@@ -64,7 +73,6 @@ class EnergyConsistent:
         self._Z = self._Y = np.empty((0, 0))
         self._inverse: Matrix | None = None  # Y^-1, once it is asked for
         self._length = 0.0  # the step they belong to; 0: none
-        self._converged = False
         self._easy = 0  # steps of the wanted length that took few rounds, in a row
         self._exchanged = 0.0  # so far [J]
 
@@ -87,13 +95,11 @@ class EnergyConsistent:
             self.impedance.begin()
             self.mobility.begin()
             try:
-                trial = self._attempt(time, step)
-                if self._converged:
-                    if self.check(trial):
-                        return self._commit(trial)
-                else:
-                    residual = trial.residual
-                    reason = f"bond residual {residual:.3g} J after {trial.rounds} rounds"
+                trial, agreed = self._attempt(time, step)
+                if agreed and self.check(trial):
+                    return self._commit(trial)
+                if not agreed:
+                    residual, reason = trial.residual, f"bond residual {trial.residual:.3g} J after {trial.rounds} rounds"
             except StepRejected as rejection:
                 failures += isinstance(rejection, StepFailed)
                 reason = str(rejection)
@@ -107,76 +113,84 @@ class EnergyConsistent:
             step = self.wanted = step / 2
             self._easy = 0
 
-    def _attempt(self, time: float, step: float) -> Step:
-        flow, effort = self._guess.at(time + step / 2)
+    def _attempt(self, time: float, step: float) -> tuple[Step, bool]:
+        """Try one step. Return it as far as it came, and whether the ends agree on it."""
         fresh = abs(step - self._length) > SLIVER * step  # slopes of another step length are of no use
-        free = self.mobility.solve(time, step, effort)
-        mobility = self.mobility.derivative() if fresh or self.impedance.yields else None
-        if mobility is not None:
-            self._set_mobility(mobility)
-        elif fresh:
-            self._set_mobility(self._differences(self.mobility, time, step, effort, free))
-        free = free - self._Y @ effort
-        met, foreseen = self.impedance.meet(time, step, free, self._Y), False
-        if met is not None:
-            flow, effort = met
-            new_flow = self.mobility.solve(time, step, effort)
-            trial = Step(time, step, new_flow, effort, step * float(effort @ (new_flow - flow)), 1)
-            self._converged = not fresh and self._alike(flow, trial)
-            if self._converged:
-                return trial
-            foreseen = not fresh and self._agree(flow, effort, new_flow)
-            if not foreseen and (mobility := self.mobility.derivative()) is not None:
-                self._set_mobility(mobility)
-            free = new_flow - self._Y @ effort
-        elif fresh:
-            effort = self.impedance.solve(time, step, flow)
-        on_law = fresh or met is not None
-        if on_law and not foreseen:
-            slope = self.impedance.derivative()
-            self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
-            self._length = step
-        self._converged, believed, before = False, True, np.inf
+        start = self._predict(time, step, fresh)
+        if (met := self.impedance.meet(time, step, start.free, self._Y)) is not None:
+            return self._confirm(time, step, *met, fresh)
+        if fresh:
+            start = start._replace(effort=self.impedance.solve(time, step, start.flow), answered=True)
+            self._find_impedance(time, step, start.flow, start.effort)
+        return self._iterate(time, step, start)
+
+    def _predict(self, time: float, step: float, fresh: bool) -> _Point:
+        """Extrapolate flow and effort, and solve the mobility end for that effort: V_free, and Y where it is `fresh` or asked for."""
+        flow, effort = self._guess.at(time + step / 2)
+        answer = self.mobility.solve(time, step, effort)
+        slope = self.mobility.derivative() if fresh or self.impedance.yields else None
+        if slope is None and fresh:
+            slope = self._differences(self.mobility, time, step, effort, answer)
+        self._set_mobility(slope)
+        return _Point(flow, effort, answer - self._Y @ effort, False)
+
+    def _confirm(self, time: float, step: float, flow: Vector, effort: Vector, fresh: bool) -> tuple[Step, bool]:
+        """Solve the mobility end for the effort at which the impedance end met `flow`. Where it answers otherwise, iterate from there."""
+        answer = self.mobility.solve(time, step, effort)
+        trial = Step(time, step, answer, effort, step * float(effort @ (answer - flow)), 1)
+        if not fresh and self._alike(flow, trial):
+            return trial, True
+        agreed = not fresh and self._agree(flow, trial)
+        if not agreed:
+            self._set_mobility(self.mobility.derivative())
+            self._find_impedance(time, step, flow, effort)
+        start = _Point(flow, effort, answer - self._Y @ effort, True)
+        return self._iterate(time, step, start, answer if agreed else None)
+
+    def _iterate(self, time: float, step: float, start: _Point, answer: Vector | None = None) -> tuple[Step, bool]:
+        """Iterate from `start` until the bond makes no energy. `answer` is the mobility end's to that effort, if only to be confirmed."""
+        before = np.inf
         for rounds in range(1, LAST_ROUND + 1):
-            Z, Y, held = self._Z, self._Y, effort
-            if not (foreseen and rounds == 1):
-                held = np.linalg.solve(self._one + Z @ Y, effort + Z @ (flow - free))
-                new_flow = self.mobility.solve(time, step, held)
-            new_effort = self.impedance.solve(time, step, new_flow)
+            Z, Y, held = self._Z, self._Y, start.effort
+            if answer is None or rounds > 1:
+                held = np.linalg.solve(self._one + Z @ Y, held + Z @ (start.flow - start.free))
+                answer = self.mobility.solve(time, step, held)
+            new_effort = self.impedance.solve(time, step, answer)
             gap = held - new_effort
-            trial = Step(time, step, new_flow, new_effort, step * float(gap @ new_flow), rounds)
+            trial = Step(time, step, answer, new_effort, step * float(gap @ answer), rounds)
             defect = abs(trial.residual) + step * abs(float(gap @ Y @ gap))
             if not np.isfinite(defect):
                 break
-            stalled = defect > FALLING * before and defect <= ROUND_OFF * step * float(np.abs(new_effort) @ np.abs(new_flow))
-            self._converged = stalled or defect <= self.tolerance * self._energy_scale(trial)
-            if self._converged:
-                break
+            stalled = defect > FALLING * before and defect <= ROUND_OFF * step * float(np.abs(new_effort) @ np.abs(answer))
+            if stalled or defect <= self.tolerance * self._energy_scale(trial):
+                return trial, True
             before = defect
-            slope = self.impedance.derivative() if believed else None
-            if rounds == DIFFERENCES_ROUNDS[slope is not None]:
-                self._Z = -self._differences(self.impedance, time, step, new_flow, new_effort)
-                believed = False
-            elif slope is not None:
-                self._Z = -slope
-            elif on_law:
-                self._broyden(new_flow - flow, effort - new_effort)
-            if (mobility := self.mobility.derivative()) is not None:
-                self._set_mobility(mobility)
-            flow, effort, free, on_law = new_flow, new_effort, new_flow - self._Y @ held, True
-        return trial
+            self._mend(start, trial)
+            start = _Point(answer, new_effort, answer - self._Y @ held, True)
+        return trial, False
+
+    def _mend(self, start: _Point, trial: Step) -> None:
+        """Renew Z and Y after the round that went from `start` to `trial`."""
+        slope = self.impedance.derivative() if trial.rounds <= DIFFERENCES_ROUNDS[True] else None
+        if trial.rounds == DIFFERENCES_ROUNDS[slope is not None]:
+            self._Z = -self._differences(self.impedance, trial.time, trial.step, trial.flow, trial.effort)
+        elif slope is not None:
+            self._Z = -slope
+        elif start.answered:
+            self._broyden(trial.flow - start.flow, start.effort - trial.effort)
+        self._set_mobility(self.mobility.derivative())
 
     def _alike(self, met: Vector, trial: Step) -> bool:
-        """Whether the flow that the impedance end met is the one that the mobility end answers, to round-off: then the step is done."""
+        """Whether the mobility end answers with the flow that the impedance end met, to round-off: then the step is done."""
         apart, size = self.bond.sizes(np.array([met - trial.flow, trial.flow]))
         agreed = bool((apart <= SAME * size + STILL * self.bond.floors).all())
         return agreed and abs(trial.residual) <= self.tolerance * self._energy_scale(trial)
 
-    def _agree(self, met: Vector, effort: Vector, answered: Vector) -> bool:
-        """Whether the mobility end answers an effort with the flow that the impedance end met, by the defect to be expected."""
-        gap = self._Z @ (met - answered)
-        defect = abs(float(gap @ answered)) + abs(float(gap @ self._Y @ gap))
-        return defect <= FORESEEN * self.tolerance * abs(float(effort @ answered))
+    def _agree(self, met: Vector, trial: Step) -> bool:
+        """Whether it answers so nearly with that flow that the defect to be expected is small: then the effort needs no mending."""
+        gap = self._Z @ (met - trial.flow)
+        defect = abs(float(gap @ trial.flow)) + abs(float(gap @ self._Y @ gap))
+        return defect <= FORESEEN * self.tolerance * abs(float(trial.effort @ trial.flow))
 
     def _commit(self, trial: Step) -> Step:
         self.impedance.commit()
@@ -192,7 +206,7 @@ class EnergyConsistent:
         return trial
 
     def _energy_scale(self, trial: Step) -> float:
-        """What the residual is measured by [J]: energy exchanged, kinetic energy of the moved end, or that of rest.
+        """The energy [J] that the residual is compared with: that exchanged, the moved end's kinetic energy, or what counts as rest.
 
         The kinetic energy counts up to the mean exchange so far: a heavy end that crosses the pull at speed would
         otherwise let residuals pass that add up to more than the tolerance of the energy exchanged.
@@ -206,11 +220,18 @@ class EnergyConsistent:
     def _differences(self, end: End, time: float, step: float, held: Vector, result: Vector) -> Matrix:
         """d(result)/d(held) of the step just solved, by forward differences from the saved state."""
         increments = self.bond.flow_increments() if end is self.impedance else self.bond.effort_increments(held)
-        columns = [(end.solve(time, step, held + d) - result) / d.sum() for d in np.diag(increments)]
-        return np.column_stack(columns)
+        return np.column_stack([(end.solve(time, step, held + d) - result) / d.sum() for d in np.diag(increments)])
 
-    def _set_mobility(self, Y: Matrix) -> None:
-        self._Y, self._inverse = Y, None
+    def _find_impedance(self, time: float, step: float, flow: Vector, effort: Vector) -> None:
+        """Set Z where the impedance end has answered `flow` with `effort`: what it tells, else by differences."""
+        slope = self.impedance.derivative()
+        self._Z = -(self._differences(self.impedance, time, step, flow, effort) if slope is None else slope)
+        self._length = step
+
+    def _set_mobility(self, Y: Matrix | None) -> None:
+        """Set Y; None, of an end that tells none, leaves it."""
+        if Y is not None:
+            self._Y, self._inverse = Y, None
 
     @property
     def _inertia(self) -> Matrix:
@@ -222,7 +243,7 @@ class EnergyConsistent:
         return self._inverse
 
     def _broyden(self, d_flow: Vector, d_force: Vector) -> None:
-        """Least change of Z, measured by the inertia, that explains the last two points."""
+        """Change Z by the least, measured by the inertia, that explains the last two points."""
         weighted = self._inertia @ d_flow
         size = float(d_flow @ weighted)
         if size > 0.0:

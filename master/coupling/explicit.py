@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..fmu.instance import StepRejected
+from ..fmu.errors import StepRejected
 from .bond import Bond
 from .scheme import Check, Counters, CouplingFailed, End, Step, accept, within
 

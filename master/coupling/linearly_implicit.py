@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..fmu.instance import StepRejected
+from ..fmu.errors import StepRejected
 from .bond import Bond, Matrix, Vector
 from .scheme import Check, Counters, CouplingFailed, End, Step, accept, within
 
@@ -38,7 +38,7 @@ class History:
         return self._last + np.sum(self._basis * self._shares, axis=1)
 
     def add(self, contribution: Vector, flow: Vector, weight: Matrix) -> None:
-        """Take in a step with its mean flow; `weight` (n, n) turns flows into contributions."""
+        """Take in a step's contribution and mean flow; `weight` (n, n) turns flows into contributions."""
         self._fit(contribution - self._last)
         velocity = 2 * flow - self._velocity
         self._basis = np.column_stack([-weight @ flow, weight @ (velocity - self._velocity)])

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..fmu.instance import StepRejected
+from ..fmu.errors import StepRejected
 from .bond import Bond, Vector
 from .energy_consistent import PATIENCE, EnergyConsistent
 from .predicted_end import PredictedEnd
@@ -44,17 +44,17 @@ class OneSided(EnergyConsistent):
             f"(largest: {gaps}) and made up for in the next step"
         )
 
-    def _attempt(self, time: float, step: float) -> Step:
-        trial = super()._attempt(time, step) if self.impedance.rollback else self._met(time, step)
-        if not self._converged:
-            return trial
+    def _attempt(self, time: float, step: float) -> tuple[Step, bool]:
+        trial, agreed = super()._attempt(time, step) if self.impedance.rollback else (self._met(time, step), True)
+        if not agreed:
+            return trial, False
         held, flow, wanted = self._foreseen.take(time, step, trial.effort)
         if self.impedance.rollback and self._outweighed():
             trial = self._followed(trial, held, flow, wanted)
         else:
             trial = replace(trial, residual=step * float(held @ flow - trial.effort @ trial.flow))
         self._foreseen.owe(step * (flow - trial.flow), step * (trial.effort - held))
-        return trial
+        return trial, True
 
     def _outweighed(self) -> bool:
         """Whether the mobility end yields less than the impedance end, Y Z < 1: an error of the foreseen flow is then small to it."""
@@ -64,9 +64,9 @@ class OneSided(EnergyConsistent):
         return bool(np.abs(np.linalg.eigvals(self._Y @ self._Z)).max() < 1.0)
 
     def _followed(self, trial: Step, held: Vector, flow: Vector, wanted: Vector) -> Step:
-        """The impedance end moved with a mobility end that has answered `held` with `flow`, so that the bond makes no energy.
+        """Solve the impedance end after a mobility end that has answered `held` with `flow`, so that the bond makes no energy.
 
-        It is told the flow `wanted`, and what little besides closes the energy: least by the flows that count, along d(f.V)/dV.
+        Its flow is `wanted` plus what little closes the energy, along d(f.V)/dV: the least in units of the flows that count.
         """
         step, start, Z = trial.step, wanted, self._Z
         try:
@@ -89,7 +89,7 @@ class OneSided(EnergyConsistent):
         return Step(trial.time, step, told, effort, step * made, trial.rounds)
 
     def _met(self, time: float, step: float) -> Step:
-        """The impedance end solved once, on the law of the other."""
+        """Solve the impedance end once, on the law of the other."""
         effort = self._guess.at(time + step / 2)[1]
         flow = self._foreseen.solve(time, step, effort)
         Y = self._foreseen.derivative()
@@ -98,5 +98,4 @@ class OneSided(EnergyConsistent):
         except StepRejected as rejection:
             raise CouplingFailed(time, step, float("nan"), f"{rejection}; it cannot roll back") from None
         assert met is not None
-        self._converged = True
         return Step(time, step, *met, 0.0, 1)

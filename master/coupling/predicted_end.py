@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..fmu.instance import StepRejected
+from ..fmu.errors import StepRejected
 from .bond import Bond, Matrix, Vector
 from .mobility_law import MeasuredLaw
 from .predictor import Extrapolation
@@ -30,7 +30,7 @@ FIT = 0.9  # per step: weight of the past in the fitted decay
 
 
 class PredictedEnd:
-    """A mobility end by its law; `take` solves the end itself, for good. Nothing need be foreseen of an end that can roll back."""
+    """A mobility end that is asked for its foreseen answer, and solved once by `take`. An end that can roll back answers itself."""
 
     rollback, yields = True, False
 
@@ -66,9 +66,9 @@ class PredictedEnd:
         return free + self._slope @ (held + self._impulse / step) + self._gap / step
 
     def take(self, time: float, step: float, effort: Vector) -> tuple[Vector, Vector, Vector]:
-        """What the end holds, `effort` and the impulse owed; its answer; the flow that would close the gap.
+        """Solve the end itself with `effort` and the impulse owed. Return what it held, its answer, and the flow that would close the gap.
 
-        Raises CouplingFailed where it discards, for there is no way back, and FmuFailed.
+        Raises CouplingFailed where the end discards the step, for there is no way back, and FmuFailed.
         """
         self._taken = True
         held = effort + self._impulse / step
@@ -144,7 +144,7 @@ class TellingLaw:
         self._velocity, self._slope = 2.0 * flow - self._velocity, slope / step
 
     def _size(self, error: Vector) -> Any:
-        """Of an error of the flow, or of every row of several."""
+        """The largest component of an error of the flow, in units of `_scale`; of every row of several."""
         return np.abs(error / self._scale).max(axis=-1)
 
     def _candidates(self, middle: float, step: float) -> tuple[Vector, ...]:
@@ -156,7 +156,7 @@ class TellingLaw:
         )
 
     def _fit_decay(self, acceleration: Vector) -> None:
-        """The rate at which a component's own velocity slows it down, by second differences, which a smooth load leaves alone."""
+        """Fit the rate [1/s] at which each component's own velocity slows it down to second differences, in which smooth loads cancel."""
         self._past.append((acceleration, self._velocity))
         if len(self._past) == 3:
             a, v = (self._past[0][k] - 2.0 * self._past[1][k] + self._past[2][k] for k in (0, 1))

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from ..fmu.instance import FmuError
+from ..fmu.errors import FmuError
 from .bond import Matrix, Vector
 
 SLIVER = 1e-9  # of a step: a remainder that is round-off of the time
 
 
 class End(Protocol):
-    """One end of the bond, see `master.coupling.bond.FmuEnd`."""
+    """One end of the bond, see `master.coupling.end.FmuEnd`."""
 
     @property
     def solves(self) -> int: ...
@@ -70,7 +70,7 @@ def accept(step: Step) -> bool:
 
 
 def within(limit: float, macro_step: float) -> float:
-    """The macro step, or what is left of the time if that is less."""
+    """The length of the next step [s]: the macro step, or `limit` if that is less or longer by round-off only."""
     return limit if limit < (1 + SLIVER) * macro_step else macro_step
 
 

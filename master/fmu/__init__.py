@@ -1,1 +1,1 @@
-"""One FMU in this process: its calls and its ports."""
+"""One FMU in this process: its file, its calls, its ports, its log."""

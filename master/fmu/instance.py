@@ -7,47 +7,23 @@ takes about 5 us).
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
-import os
-import tempfile
 import weakref
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
-import fmpy
 import numpy as np
-from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import RunError
+from .errors import STEP_FAILURES, FmuError, FmuFailed
+from .loading import free, instantiated, read
+from .messages import last_words, log, spoken
 from .ports import Port, read_ports
 
 Names = str | tuple[str, ...]
-_KEPT_MESSAGES = 20
-
-
-class FmuError(RunError):
-    """What an FMU refused; the text is one line with the FMU's name and its own words."""
-
-
-class StepRejected(FmuError):  # noqa: N818
-    """The FMU discarded a step (fmi2Discard): try again from a saved state with a shorter one."""
-
-
-class StepFailed(StepRejected):
-    """A step after which the FMU stands in error (fmi2Error) or answers with NaN: one more try from a saved state makes sense."""
-
-
-class FmuFailed(FmuError):  # noqa: N818
-    """The FMU cannot go on (fmi2Fatal, or an error outside a step), or was asked for something it does not have."""
-
-
-STEP_FAILURES = {2: StepRejected, 3: StepFailed}  # fmi2Discard, fmi2Error
 
 
 class _Channel(NamedTuple):
@@ -66,43 +42,17 @@ class Fmu:
     """
 
     def __init__(self, path: str | Path, instance_name: str = "") -> None:
-        self.path, self.messages = Path(path), deque[tuple[int, str]](maxlen=_KEPT_MESSAGES)
-        try:
-            model = fmpy.read_model_description(str(path), validate=False)
-        except Exception as error:  # FMPy raises whatever its parsers raise
-            raise FmuFailed(f"{path}: not a readable FMU: {error}") from None
+        model = read(path)
+        self.path, self.messages = Path(path), log()
         self.name, self.guid = instance_name or model.modelName, model.guid
         self.ports = read_ports(model)
-        if model.coSimulation is None or not model.fmiVersion.startswith("2."):
-            raise FmuFailed(f"{path}: not an FMU for co-simulation by FMI 2.0")
         self.can_rollback = bool(model.coSimulation.canGetAndSetFMUstate)
         self.has_derivatives = bool(model.coSimulation.providesDirectionalDerivative)
         self.can_vary_step = bool(model.coSimulation.canHandleVariableCommunicationStepSize)
-        folder = tempfile.TemporaryDirectory(prefix="fmu_", ignore_cleanup_errors=True)  # Windows keeps a library that is loaded
-        location = Path(folder.name, "resources").as_uri()
-        if (model.generationTool or "").startswith("PythonFMU"):  # which knows no escape but that of the blank
-            location = f"file://{folder.name}/resources".replace(" ", "%20")
-            if "%20" in folder.name:  # it would crash
-                raise FmuFailed(f"{self.name}: FMUs of PythonFMU cannot be unpacked in {folder.name}; set TMPDIR to a path without %20")
+        self._fmu, folder = instantiated(path, model, self.name, self.messages)
         self._states: set[int] = set()
-        try:
-            fmpy.extract(str(path), folder.name)
-            self._fmu = fmi2.FMU2Slave(
-                guid=model.guid,
-                modelIdentifier=model.coSimulation.modelIdentifier,
-                unzipDirectory=folder.name,
-                instanceName=self.name,
-            )
-            self._fmu.callbacks = _callbacks(self.messages)
-            words = self.name.encode(), fmi2.fmi2CoSimulation, model.guid.encode(), os.fsencode(location)
-            self._fmu.component = self._fmu.fmi2Instantiate(*words, ctypes.byref(self._fmu.callbacks), False, True)
-            if not self._fmu.component:
-                raise FmuFailed("failed to instantiate")
-        except Exception as error:  # as above; the FMU's own words are in the log
-            folder.cleanup()
-            raise FmuFailed(f"{self.name}: cannot be loaded: {self._words(str(error))}") from None
         self.remark = ""  # the FMU's warnings about its start, or about its last step, a line each
-        self._close = weakref.finalize(self, _free, self._fmu, self._states, folder)  # at exit at the latest
+        self._close = weakref.finalize(self, free, self._fmu, self._states, folder)  # at exit at the latest
         self._component = ctypes.c_void_p(self._fmu.component)
         self._channels: dict[Names, _Channel] = {}
         # function objects of our own: FMPy's check and convert every argument
@@ -126,7 +76,7 @@ class Fmu:
         for name, value in (inputs or {}).items():
             self.set(name, value)
         self._call("initialisation", self._fmu.exitInitializationMode)
-        self.remark = "\n".join(self._spoken()) if self.messages else ""
+        self.remark = "\n".join(spoken(self.messages)) if self.messages else ""
 
     def close(self) -> None:
         """Free every state, the instance and the unpacked files; safe to call twice."""
@@ -187,7 +137,7 @@ class Fmu:
         status = self._do_step(self._component, ctypes.c_double(time), ctypes.c_double(step), final)
         if status > 1:
             raise self._failure(f"step of {step:.6g} s at {time:.9g} s", STEP_FAILURES.get(status, FmuFailed))
-        self.remark = "\n".join(self._spoken()) if self.messages else ""
+        self.remark = "\n".join(spoken(self.messages)) if self.messages else ""
 
     def snapshot(self) -> ctypes.c_void_p:
         """A handle to the FMU's whole state, for `restore`; freed by `release` or `close`."""
@@ -257,45 +207,7 @@ class Fmu:
             raise self._failure(what) from None
 
     def _failure(self, what: str, kind: type[FmuError] = FmuFailed) -> FmuError:
-        words = self._words("no message")
+        words = last_words(self.messages, "no message")
         if words == "interrupted":  # Ctrl-C reached the FMU first
             raise KeyboardInterrupt
         return kind(f"{self.name}: {what}: {words}")
-
-    def _words(self, otherwise: str) -> str:
-        """The latest warning or complaint in the log; forgets it."""
-        spoken = self._spoken()
-        return spoken[-1] if spoken else otherwise
-
-    def _spoken(self) -> list[str]:
-        """The latest warnings and complaints in the log; forgets them."""
-        spoken = [text for status, text in self.messages if status > 0]
-        self.messages.clear()
-        return spoken
-
-
-def _callbacks(messages: deque[tuple[int, str]]) -> Any:
-    """Callbacks that put the log's messages into `messages`.
-
-    FMPy's proxy, which fills in printf arguments, keeps one logger a process: with it all messages would reach the last
-    instance. Without it messages are seen as formats, and '%%' is the only directive undone here.
-    """
-
-    def note(environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-        lines = message.decode("utf-8", "replace").replace("%%", "%").split("\n")
-        messages.append((status, lines[-1].strip()))  # PythonFMU puts a line of its own before a failure's text
-
-    callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(note)
-    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-    return callbacks
-
-
-def _free(fmu: Any, states: set[int], folder: tempfile.TemporaryDirectory[str]) -> None:
-    """PythonFMU crashes a process that exits with living instances."""
-    with contextlib.suppress(FMICallException):
-        while states:
-            fmu.freeFMUstate(ctypes.c_void_p(states.pop()))
-    fmu.freeInstance()
-    folder.cleanup()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import threading
-import time as clock
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -28,7 +28,7 @@ def breakable() -> Iterator[None]:
 
     def stop(*_: object) -> None:
         nonlocal last
-        before, last = last, clock.monotonic()
+        before, last = last, time.monotonic()
         _asked.set()
         if last - before > SAME:
             raise KeyboardInterrupt

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-import time as clock
+import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -20,18 +20,18 @@ from tqdm import tqdm
 
 from master.coupling.ledger import EnergyCheckFailed
 from master.errors import RunError
-from master.process import crash as post_mortem
+from master.process import crash
 from master.process.child import Death
 from master.process.folders import taken, unwritable
 from master.process.screen import patience
 from master.process.signals import postponed
 from master.results import figures, report
 from master.results.recorder import SIGNALS, Recorder, Signal
-from master.run.drive import Drive, open_drive
+from master.run.drive import Drive
+from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
 from master.run.two_fmu_drive import open_bonded, signals
-from master.scene import physics
-from master.scene import remarks as scene_remarks
+from master.scene import physics, remarks
 from master.scene.reading import Scene
 from master.scene.two_fmus import General
 
@@ -62,7 +62,7 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
     """
     with taken(folder):
         try:
-            unfinished = tempfile.TemporaryDirectory(prefix=post_mortem.scratch_prefix(os.getpid()), dir=folder)
+            unfinished = tempfile.TemporaryDirectory(prefix=crash.scratch_prefix(os.getpid()), dir=folder)
         except OSError as error:
             raise unwritable(folder, error) from None
         with unfinished as scratch:
@@ -70,31 +70,31 @@ def simulate(scene: Scene, folder: Path, screen: TextIO) -> Result:
                 return _simulated(scene, folder, Path(scratch), screen)
             except OSError as error:  # a full disk, or a folder that is gone
                 how = f"could not write {error.filename or 'its results'} ({error.strerror or error})"
-                left = post_mortem.bury(folder, Death(how, os.getpid()), "failed")
+                left = crash.bury(folder, Death(how, os.getpid()), "failed")
                 raise RunError(f"the process {how}{left}") from None
 
 
 def _simulated(scene: Scene, folder: Path, scratch: Path, screen: TextIO) -> Result:
     """Run a scene; the files that are made at its end are made in `scratch`. Raises as `simulate`, and OSError."""
     with ExitStack() as stack:
-        begun = clock.perf_counter()
+        begun = time.perf_counter()
         calm = stack.enter_context(patience(screen))
         try:
             simulation, drive, kept = scene.sections.simulation, *_open(scene, stack)
         except OSError as error:
             raise RunError(f"the units cannot be opened: {error}") from None
         _clear(folder)
-        report.write_summary(folder / "summary.json", post_mortem.place_holder(scene.name, os.getpid(), drive.ledger.kinds))
+        report.write_summary(folder / "summary.json", crash.place_holder(scene.name, os.getpid(), drive.ledger.kinds))
         stream = stack.enter_context((folder / "signals.csv").open("w", encoding="utf-8"))
         every = None if isinstance(scene.sections, General) else simulation.recorded_every
         recorder = Recorder(drive.units, every, simulation.snapshots, kept, stream)
-        started = clock.perf_counter()
+        started = time.perf_counter()
         ending = _march(drive, recorder, scene, screen, calm)
-        wall = {"wall_s": clock.perf_counter() - started, "preparation_s": started - begun}
+        wall = {"wall_s": time.perf_counter() - started, "preparation_s": started - begun}
         if ending.status in ("completed", "interrupted"):  # else the FMUs may stand within a step
             recorder.record_shape(drive.time)
         account: dict[str, Any] = {"coupling": drive.scheme, "physics": physics.acting(scene)}
-        account |= {"start_remarks": scene_remarks.of(scene) | drive.remarks.start, "remarks": drive.remarks.summary()}
+        account |= {"start_remarks": remarks.of(scene) | drive.remarks.start, "remarks": drive.remarks.summary()}
         account |= {**_facts(drive), **asdict(ending), **asdict(drive.cost), **wall}
         account |= drive.ledger.summary()
         account |= {"energy_check_passed": ending.status != "stopped" and not drive.ledger.complaint}

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from master.coupling.bond import Bond, FmuEnd, end_value_ends, impedance_end, mobility_end
+from master.coupling.bond import Bond
 from master.coupling.choose import coupling
+from master.coupling.end import FmuEnd, end_value_ends, impedance_end, mobility_end
 from master.coupling.ledger import Ledger
 from master.errors import UsageError
 from master.fmu.instance import Fmu
@@ -54,7 +55,7 @@ class Bonded(OnBond):
         self._coupling = coupling(rules.scheme, *self._ends, bond, self._macro_step, rules.tolerance, self.ledger.check)
 
     def _check_rollback(self, bond: Bond) -> None:
-        """Save, step, restore, step of every end that claims to roll back, under more than it holds at rest. Raises UsageError."""
+        """Check that each end that claims to roll back repeats a step, under more than it holds at rest. Raises UsageError."""
         impedance, mobility = self._ends
         flow, effort = mobility.result(), impedance.result()
         for end, held in ((impedance, flow + bond.flow_increments()), (mobility, effort + bond.effort_increments(effort))):

@@ -9,7 +9,8 @@ from typing import Any
 
 from master.coupling.bond import Bond, Pair
 from master.errors import UsageError
-from master.fmu.instance import Fmu, FmuFailed
+from master.fmu.errors import FmuFailed
+from master.fmu.instance import Fmu
 from master.fmu.ports import ENERGY, POWER, Port
 from master.scene.two_fmus import General, PairOfPorts
 

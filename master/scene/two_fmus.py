@@ -71,7 +71,7 @@ class PairOfPorts(SceneTable):
 class BondTable:
     """[bond]; the derivative ports are dF/dV of the impedance unit, F = -effort, and d(flow)/d(effort) of the other.
 
-    `yielding` is the input by which the impedance unit takes the latter, see `master.coupling.bond.FmuEnd.meet`.
+    `yielding` is the input by which the impedance unit takes the latter, see `master.coupling.end.FmuEnd.meet`.
     """
 
     impedance: str

@@ -21,7 +21,8 @@ from tqdm import tqdm
 from pipe_fmu import Pipe, PipeParameters, Seabed, Section
 from pipe_fmu.environment import Current, Environment
 from pipe_fmu.maths.so3 import matrix
-from pipe_fmu.step.integrator import WORKS, PipeState, StepResult
+from pipe_fmu.step.integrator import StepResult
+from pipe_fmu.step.state import WORKS, PipeState
 
 HALVINGS = 8
 _OF_EXCHANGED, _OF_STORED = 1e-10, 1e-14

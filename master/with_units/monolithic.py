@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from master.errors import RunError
-from master.run.drive import LOADS
+from master.run.pipe_drive import LOADS
 from master.scene.reading import Scene
 from master.scene.sections import mean_load
 from master.with_units.statics import equilibrium, released
 from pipe_fmu import Pipe
-from pipe_fmu.step.integrator import PipeState
+from pipe_fmu.step.state import PipeState
 from vessel_fmu.vessel import Inputs, State, Vessel
 
 _TOLERANCE = 1e-12  # of the velocity: near round-off

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from master.errors import RunError, UsageError, broken_arithmetic
-from master.fmi.build import Recipe, build_fmu, cache_folder, cached_fmu
+from master.fmi.build import Recipe, build_fmu, cached_fmu
+from master.fmi.cache import cache_folder
 from master.fmi.native.ahead import made_ahead
 from master.fmi.native.export import native_fmu
 from master.fmi.native.machine import PLATFORMS, own_platform

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from master.coupling.bond import Bond, FmuEnd, end_value_ends, impedance_end, mobility_end
+from master.coupling.bond import Bond
 from master.coupling.choose import coupling
+from master.coupling.end import FmuEnd, end_value_ends, impedance_end, mobility_end
 from master.coupling.hang_off import hang_off
 from master.coupling.ledger import Action, Columns, Ledger
 from master.coupling.scheme import Check, Scheme

@@ -1,4 +1,4 @@
-"""The paper's scene: pipe and vessel through their FMUs and the master, and both solved together in-process (master.monolithic).
+"""The paper's scene: pipe and vessel through their FMUs and the master, and both solved together in-process (master.with_units.monolithic).
 
 Errors are root mean squares over the instants of force and moment on the pipe's top and of the vessel's position, against a finer
 monolithic run; its uncertainty is its distance from one with half the elements and twice the step. A share is an error over the largest
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from master.errors import RunError
-from master.scene import reading as scene
+from master.scene import reading
 from master.studies.benchmarks.through_fmus import apart, march
 
 DURATION, SAMPLE = 300.0, 2.0  # s
@@ -68,9 +68,9 @@ def run(setting: Setting) -> tuple[float, Histories]:
 
 def _monolithic(changes: Sequence[str], times: np.ndarray) -> tuple[float, list[np.ndarray]]:
     """As `march`, of both solved as one."""
-    from master.with_units.monolithic import march as together
+    from master.with_units import monolithic
 
-    pipe, vessel, moments = together(scene.load("paper", [*changes, f"simulation.duration={float(times[-1])!r}"]))
+    pipe, vessel, moments = monolithic.march(reading.load("paper", [*changes, f"simulation.duration={float(times[-1])!r}"]))
     next(moments)
     found, spent = [], 0.0
     for t in times.tolist():

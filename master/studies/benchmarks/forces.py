@@ -17,7 +17,7 @@ from master.errors import RunError
 from master.studies.benchmarks.line import CASES, PIPE
 from pipe_fmu import Pipe
 from pipe_fmu.results.section_forces import SectionForces
-from pipe_fmu.step.integrator import PipeState
+from pipe_fmu.step.state import PipeState
 
 COUNTS, REFERENCE = (24, 48, 96, 192), 512
 MESHES: tuple[Literal["adapted", "uniform"], ...] = ("adapted", "uniform")

@@ -15,7 +15,7 @@ from master.studies.benchmarks.histories import SAMPLE, Histories, LineCase, Set
 from master.studies.benchmarks.through_fmus import apart, march
 from pipe_fmu import Pipe, PipeParameters
 from pipe_fmu.maths.so3 import matrix
-from pipe_fmu.step.integrator import PipeState
+from pipe_fmu.step.state import PipeState
 
 _SAME = 1e-6  # m: nodes of the FMU and of the step in-process, with the same nodes and steps
 

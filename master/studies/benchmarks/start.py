@@ -34,7 +34,7 @@ _COMPILED = (
     "sys.exit(len(seen.buffer))"
 )
 _FIRST = (
-    "from master.run.drive import open_drive\n"
+    "from master.run.pipe_drive import open_drive\n"
     "from master.run.prepared import prepare\n"
     "from master.scene.reading import load\n"
     "loaded = load('paper')\n"

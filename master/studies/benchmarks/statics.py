@@ -17,7 +17,7 @@ import numpy as np
 from scipy.integrate import solve_bvp
 
 from master.errors import RunError
-from master.scene import reading as scene
+from master.scene import reading
 from master.with_units.statics import equilibrium
 from pipe_fmu import Pipe, PipeParameters
 
@@ -45,7 +45,7 @@ SETTINGS = (
 
 def paper() -> PipeParameters:
     """The pipe of the paper's scene, its top held where the scene's equilibrium has it, the nodes not yet placed."""
-    return replace(equilibrium(scene.load("paper")).pipe, nodes_at=())
+    return replace(equilibrium(reading.load("paper")).pipe, nodes_at=())
 
 
 def run(parameters: PipeParameters, setting: Setting) -> tuple[float, float, np.ndarray]:

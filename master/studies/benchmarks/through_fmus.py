@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from master.results.recorder import SIGNALS, Recorder
-from master.run.drive import open_drive
+from master.run.pipe_drive import open_drive
 from master.run.prepared import prepare
 from master.run.simulate import row
-from master.scene import reading as scene
+from master.scene import reading
 
 _REACHED = 1e-9  # s; an instant this close to the end of a step is reached
 
@@ -33,7 +33,7 @@ def march(
     """CPU time [s] of the master's steps, with the ledger's check and, if `recorded`, with the recording of `pipelay run`; and the values
     (k, n) of each of the `ports`, (unit, port), at `times` (k,) [s]. Raises RunError.
     """
-    loaded = scene.load(name, [*changes, f"simulation.duration={float(times[-1])!r}"])
+    loaded = reading.load(name, [*changes, f"simulation.duration={float(times[-1])!r}"])
     simulation, spent = loaded.sections.simulation, 0.0
     found: list[list[np.ndarray]] = [[] for _ in ports]
     with open_drive(loaded.sections, prepare(loaded)) as drive:

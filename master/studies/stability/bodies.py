@@ -10,7 +10,7 @@ twice that as well.
 from __future__ import annotations
 
 import math
-import time as clock
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -166,7 +166,7 @@ def run(case: Case, rest: Rest) -> Outcome:
     pipe = Half(rest.pipe, {}, ("end_force", "end_moment"), PIPE_COLUMNS)
     ends = ("end_velocity", "end_angular_velocity")
     body = Half(rest.body, body_parameters(case, rest), ends, BODY_COLUMNS)
-    begun, message, gaps, solves, pulls = clock.process_time(), "", np.zeros(2), [0], [float(np.linalg.norm(rest.pull[:3]))]
+    begun, message, gaps, solves, pulls = time.process_time(), "", np.zeros(2), [0], [float(np.linalg.norm(rest.pull[:3]))]
     with paired(pipe, body, hang_off(), case.scheme, case.step, case.tolerance, rollback=case.rollback) as pair:
         try:
             for _ in pair.run(case.duration):
@@ -185,7 +185,7 @@ def run(case: Case, rest: Rest) -> Outcome:
             ledger.interface_residual / max(ledger.exchanged, 1e-300), float(gaps[0]), float(gaps[1]),
             float(np.median(np.diff(solves))) if len(solves) > 1 else math.nan,
             int(np.diff(solves).max(initial=0)), done.steps, getattr(done, "rejected_steps", 0),
-            pulls[0] / 1e3, min(pulls) / 1e3, max(pulls) / 1e3, clock.process_time() - begun, message,
+            pulls[0] / 1e3, min(pulls) / 1e3, max(pulls) / 1e3, time.process_time() - begun, message,
         )  # fmt: skip
 
 

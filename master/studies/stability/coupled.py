@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from master.coupling.bond import Bond, FmuEnd, Pair, impedance_end, mobility_end
+from master.coupling.bond import Bond, Pair
 from master.coupling.choose import coupling
+from master.coupling.end import FmuEnd, impedance_end, mobility_end
 from master.coupling.ledger import Columns, Ledger
 from master.coupling.scheme import Scheme
 from master.fmi.build import Recipe, cached_fmu

@@ -9,7 +9,6 @@ unit vector of the state, the exchanged values included.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -132,7 +131,7 @@ def grows(scheme: str, frequency: float, folder: Path, steps: int = 200) -> bool
     with paired(spring, mass, scalar_bond(), scheme, frequency, 1e-12) as pair:
 
         def energy() -> float:
-            return float(sum(unit.get(COLUMNS.energy).sum() for unit in (pair.impedance, pair.mobility)))  # type: ignore[arg-type]
+            return float(sum(unit.get(tuple(COLUMNS.energy)).sum() for unit in (pair.impedance, pair.mobility)))
 
         before, most = energy(), 1.0 + GROWTH
         if scheme == "serial":  # its energy swings below the limit, without growing
@@ -188,7 +187,9 @@ def draw(path: Path, found: dict[str, np.ndarray], frequencies: np.ndarray = FRE
         figure.savefig(path)
 
 
-def map_rows(found: dict[str, np.ndarray], frequencies: Sequence[float] = FREQUENCIES, ratios: Sequence[float] = RATIOS) -> list[dict]:  # type: ignore[assignment]
+def map_rows(
+    found: dict[str, np.ndarray], frequencies: np.ndarray = FREQUENCIES, ratios: np.ndarray = RATIOS
+) -> list[dict[str, float]]:
     """The map as rows of a table."""
     return [
         {"mass_ratio": float(r), "h_sqrt_k_m": float(x), **{scheme: float(radius[i, j]) for scheme, radius in found.items()}}

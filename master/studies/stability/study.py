@@ -12,7 +12,8 @@ from typing import Any, TextIO
 from tqdm import tqdm
 
 import pipe_fmu
-from master.fmi.build import Recipe, cache_folder
+from master.fmi.build import Recipe
+from master.fmi.cache import cache_folder
 from master.studies.stability import bodies, limits, published
 from master.studies.stability.coupled import BODY, built
 
