@@ -14,7 +14,7 @@ from pipe_fmu.constants import constants_on
 from pipe_fmu.environment import Current, Environment
 from pipe_fmu.notes import ERROR, SIZE, texts
 from pipe_fmu.parameters import AddedMass
-from pipe_fmu.slave import N_INPUTS, PipeUnit
+from pipe_fmu.slave import PipeUnit
 from pipe_fmu.values import value_places, values
 from pipe_fmu.vectors import constants_size, loaded, unpacked
 
@@ -163,7 +163,7 @@ def begun(unit, parameters, at):
     status, constants, words = refilled(exported, values(parameters))
     assert (status, words) == (0, [])
     state, notes = np.empty_like(unit.state), np.zeros(SIZE)
-    status = native.unit_start(constants, exported, unit.state, np.zeros(N_INPUTS), at, state, notes)
+    status = native.unit_start(constants, exported, unit.state, np.zeros(native.N_INPUTS), at, state, notes)
     return status, texts(notes, native.MESSAGES), state, time.perf_counter() - since
 
 
@@ -212,7 +212,7 @@ def test_where_the_way_cannot_be_gone_the_start_is_refused(started):
     loaded(nowhere, CLAMPED.nodes, True).pipe.position[5] = math.nan
     _, constants, _ = refilled(exported, values(wall(unit._pipe.parameters, 0.025)))
     state, notes = np.zeros_like(nowhere), np.zeros(SIZE)
-    assert native.unit_start(constants, exported, nowhere, np.zeros(N_INPUTS), 0.0, state, notes) == ERROR
+    assert native.unit_start(constants, exported, nowhere, np.zeros(native.N_INPUTS), 0.0, state, notes) == ERROR
     assert texts(notes, native.MESSAGES) == [
         "statics: no equilibrium was found on the way from the exported one; export the FMU anew with these values"
     ]
