@@ -170,8 +170,8 @@ def test_a_damping_that_the_pipe_has_no_output_for_is_refused(damping):
             pipe.initialize({f"{damping}_damping": 0.05})
 
 
-def test_an_exported_pipe_of_another_length_gets_new_nodes_where_its_own_are_dropped():
-    exported = prepare(reading.load("paper"))["pipe"]
+def test_a_pipe_run_by_python_gets_new_nodes_for_another_length_where_its_own_are_dropped():
+    exported = prepare(reading.load("paper"), ["--python"])["pipe"]
     with Fmu(exported, "pipe") as pipe, pytest.raises(FmuFailed, match=r"length 1210 m; an empty one places the nodes anew"):
         pipe.initialize({"length": 1210.0})
     with Fmu(exported, "pipe") as pipe:

@@ -9,7 +9,7 @@ from units.toys import build_pair, tied
 from master.coupling.bond import Bond, Pair
 from master.coupling.choose import coupling
 from master.coupling.end import impedance_end, mobility_end
-from master.coupling.energy_consistent import EnergyConsistent
+from master.coupling.energy_consistent import LEAST, EnergyConsistent
 from master.coupling.hang_off import hang_off
 from master.coupling.linearly_implicit import History, LinearlyImplicit
 from master.coupling.predictor import Extrapolation
@@ -393,7 +393,7 @@ def test_a_residual_is_measured_by_the_kinetic_energy_of_the_moved_end_up_to_the
     assert scheme._energy_scale(across) == pytest.approx(step * 7.0 * 1e-6)  # nothing exchanged so far: only what counts as rest
     for exchanged, expected in ((100.0, 0.5 * 3.0 * 2.0**2), (2.0, 2.0)):
         scheme._exchanged = exchanged
-        assert scheme._energy_scale(across) == pytest.approx(expected)
+        assert scheme._energy_scale(across) == pytest.approx(expected, rel=LEAST)
 
 
 class Linear(Still):

@@ -166,7 +166,7 @@ def test_kernels_are_compiled_once_for_all_who_ask_at_once_and_again_where_some_
         kernel.write_bytes(b".")  # the first of many: the others take time
         sleep(0.2)
 
-    monkeypatch.setattr(build, "_kernels", compiled)
+    monkeypatch.setattr(build, "_start", compiled)
     fmu = cached_fmu(SPRING, tmp_path)
     with ThreadPoolExecutor() as pool:
         list(pool.map(lambda _: build.compile_kernels(SPRING, fmu), range(4)))

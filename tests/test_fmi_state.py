@@ -44,6 +44,13 @@ def exported(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def by_python(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("by python")
+    assert main(["export", "--python", "-o", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
 def small(tmp_path_factory):
     parameters = {"nodes": 6, "mesh": "uniform", "foot": "pinned", "top": "pinned"}
     return build_fmu(Recipe(Path(pipe_fmu.__file__).parent, "slave.PipeUnit", parameters), tmp_path_factory.mktemp("small") / "pipe.fmu")
@@ -127,9 +134,9 @@ def test_instances_of_two_exports_keep_apart_in_one_process(exported, small):
         assert c.port("node_tension").size == 6 != a.port("node_tension").size
 
 
-def test_pipes_of_two_packages_are_two_types_to_the_compiler(exported):
+def test_pipes_of_two_packages_are_two_types_to_the_compiler(by_python):
     """Else a kernel compiled where an FMU was first would be kept with the FMU's type in it, and fail in processes without the FMU."""
-    bundled = importlib.import_module(f"{bundled_package(exported / 'pipe.fmu').__name__}.step.state")
+    bundled = importlib.import_module(f"{bundled_package(by_python / 'pipe.fmu').__name__}.step.state")
     tuples = []  # alive together: numba lets equal names be one type
     for cls in (bundled.PipeState, PipeState):
         state = types.NamedTuple([types.float64] * len(cls._fields), cls)
@@ -165,9 +172,9 @@ def test_many_lives_of_an_instance_hold_memory(small, exported, unit):
 
 
 @pytest.mark.parametrize("unit", UNITS)
-def test_an_instance_is_gone_when_it_is_let_go(exported, unit, tmp_path):
+def test_an_instance_is_gone_when_it_is_let_go(by_python, unit, tmp_path):
     """It holds no reference to itself: a process with many lives does not grow until its garbage collector comes."""
-    resources = str(c_host.unpacked(exported / f"{unit}.fmu", tmp_path / "unit") / "resources")
+    resources = str(c_host.unpacked(by_python / f"{unit}.fmu", tmp_path / "unit") / "resources")
     server = runpy.run_path(f"{resources}/runtime.py")["load"](resources).__self__
     slave = server.slave_class(instance_name="it", resources=resources, visible=False)
     gc.disable()
@@ -238,9 +245,9 @@ def test_both_ends_of_a_bond_have_one_nominal_value(exported):
 
 
 @pytest.mark.parametrize("unit", UNITS)
-def test_an_fmu_holds_the_binary_of_linux_alone_and_an_entry_to_its_licences(exported, unit):
+def test_an_fmu_run_by_python_holds_the_binary_of_linux_alone_and_an_entry_to_its_licences(by_python, unit):
     """FMI 2.0.4, 2.3. PythonFMU's library for Windows cannot load without a Python of its version on the path."""
-    with zipfile.ZipFile(exported / f"{unit}.fmu") as archive:
+    with zipfile.ZipFile(by_python / f"{unit}.fmu") as archive:
         names = archive.namelist()
         entry = archive.read("documentation/licenses/license.txt").decode()
     assert {name.split("/")[1] for name in names if name.startswith("binaries/")} == {"linux64"}
@@ -296,15 +303,17 @@ def test_corrections_are_counted_by_a_discrete_integer(exported):
         assert fmu._fmu.getReal([variable.valueReference]) == list(fmu.get("newton_iterations"))  # CoFmuPy reads every output so
 
 
-def test_what_it_says_it_can_do_it_can(exported):
+@pytest.mark.parametrize("kind", ["machine code", "by Python"])
+def test_what_it_says_it_can_do_it_can(exported, by_python, kind):
     """Steps of any length meet at one place; state as in the tests above; what is not offered is refused, not done badly."""
+    folder = exported if kind == "machine code" else by_python
     for unit in UNITS:
-        model = fmpy.read_model_description(str(exported / f"{unit}.fmu")).coSimulation
+        model = fmpy.read_model_description(str(folder / f"{unit}.fmu")).coSimulation
         assert (model.canHandleVariableCommunicationStepSize, model.canGetAndSetFMUstate, model.canSerializeFMUstate) == (True,) * 3
         assert (model.canInterpolateInputs, model.providesDirectionalDerivative) == (False,) * 2
-        assert model.needsExecutionTool  # a Python on the machine
+        assert model.needsExecutionTool == (kind == "by Python")
         assert (model.canBeInstantiatedOnlyOncePerProcess, model.canRunAsynchronuously, model.maxOutputDerivativeOrder) == (False, False, 0)
-    with Fmu(exported / "pipe.fmu") as fmu:
+    with Fmu(folder / "pipe.fmu") as fmu:
         fmu.initialize()
         start, velocity, time = fmu.get("top_position"), np.array([0.2, -0.1, 0.3]), 0.0
         fmu.set("velocity", velocity)

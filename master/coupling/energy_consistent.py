@@ -41,6 +41,7 @@ ROUND_OFF = 1e-10  # of the product of the magnitudes: without progress below th
 SAME, STILL = 1e-12, 1e-8  # of a flow, and of one that counts as rest: what moves no pose by more than its own round-off
 FORESEEN = 0.1  # of the tolerance: a defect this small needs no better effort before it is confirmed
 EASY = 3  # rounds of an easy step
+LEAST = 1e-3  # of the mean mobility
 PATIENCE = 4  # easy steps in a row after which a halved step grows
 SMALLEST_STEP = 2.0**-12  # of the macro step
 
@@ -235,11 +236,11 @@ class EnergyConsistent:
 
     @property
     def _inertia(self) -> Matrix:
+        """Inverse of Y, to which LEAST of its mean is added: where an end hardly moves, a mobility that was measured is but round-off."""
         if self._inverse is None:
-            try:
-                self._inverse = np.linalg.inv(self._Y)
-            except np.linalg.LinAlgError:  # an end that cannot move in some direction has no inertia there
-                self._inverse = np.linalg.pinv(self._Y)
+            units = self.bond.flow_increments() ** 2
+            mean = float((np.diagonal(self._Y) / units).mean())
+            self._inverse = np.linalg.inv(self._Y + np.diag(LEAST * mean * units)) if mean > 0.0 else np.zeros_like(self._Y)
         return self._inverse
 
     def _broyden(self, d_flow: Vector, d_force: Vector) -> None:
