@@ -158,14 +158,18 @@ def add_press_stiffness(points, sag_row, matrix, row):
     for k in range(4):
         if points[k, 1] == 0.0:
             continue
-        x = POINTS[k]
-        y = 1.0 - x
-        expand(sag_row, row)
-        for i in range(12):
-            row[i] *= x * y
-        row[2] += y
-        row[8] += x
+        _depth_row(sag_row, POINTS[k], row)
         add_outer(matrix, points[k, 1], row, row)
+
+
+@inner
+def _depth_row(sag_row, x, row):
+    """Fill `row` (12,) with the gradient of the depth at x, from that of the sag (9,)."""
+    expand(sag_row, row)
+    for i in range(12):
+        row[i] *= x * (1.0 - x)
+    row[2] += 1.0 - x
+    row[8] += x
 
 
 @inner
@@ -176,30 +180,20 @@ def add_mean_contact(bed, e, h, dt, old, new, ends, mean_row, new_row, with_tang
     of the sag, averaged over the step and at its end; h: length of the element, dt: of the step. The dashpot's force is damping * z'
     times the elastic force: it acts in contact only, and at most takes that force away. Friction is Coulomb's, regularised.
     Tangent if `with_tangent`; that of friction is Newton's if `newton_friction`, else one that never underrates it, with which no
-    correction overshoots.
-    `scratch`: one of (3, 12). Returns the work dissipated [J].
+    correction overshoots. `scratch`: one of (3, 12). Returns the work dissipated [J].
     """
-    diameter, weight = bed.diameter[e], bed.bearing[e]
-    dissipated = 0.0
+    diameter, weight, dissipated = bed.diameter[e], bed.bearing[e], 0.0
     row, row_new = scratch[0][0], scratch[0][1]
     for k in range(4):
         x = POINTS[k]
-        y = 1.0 - x
         z_old, z_new = depth(x, old[0], old[1], old[2]), depth(x, new[0], new[1], new[2])
         force, slope = mean_contact(z_old, z_new, diameter, weight)
         if force == 0.0 and slope == 0.0:
             continue
         share = h * _WEIGHTS[k]
-        expand(mean_row, row)
+        _depth_row(mean_row, x, row)
         if with_tangent:
-            expand(new_row, row_new)
-        for i in range(12):
-            row[i] *= x * y
-            row_new[i] *= x * y
-        row[2] += y
-        row[8] += x
-        row_new[2] += y
-        row_new[8] += x
+            _depth_row(new_row, x, row_new)
         rate = 0.0  # of the points' depth; from the velocities, as a difference of depths over a very short step is round-off
         for i in range(6):
             rate += row[i] * ends[0, i] + row[6 + i] * ends[1, i]

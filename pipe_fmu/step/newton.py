@@ -6,99 +6,27 @@ import numpy as np
 
 from ..compiled import inlined, inner, kernel
 from ..element.ends import condense_top, hold_foot, hold_foot_tangent, top_correction, yielding
-from ..element.strains import STRAINS, growth
+from ..element.strains import growth
 from ..line import line_columns
 from ..maths.block_tridiagonal import SIZE, condense, factorize, substitute
 from ..maths.so3 import add
 from ..simd.columns import chord, take, vector_of
-from ..simd.lanes import larger
 from .nodes import advance
+from .residual import elastic_round_off, inertial_scales, largest_residual, work_left
 from .state import WORKS, PipeState
 from .system import assemble, old_columns
 
 TOLERANCE = 1e-11  # of the largest element force (moment), inertia included as below: well below any coupling tolerance
 ROUND_OFF = 1e-9  # accepted once the residual no longer falls
-EXCHANGED, STORED = 2e-11, 2e-15  # of the energies exchanged and stored in a step: work that its residual may do
 PATIENCE = 8  # corrections of a settled residual that do not lower it, after which its work is taken for round-off
 INERTIAL = 1e-3  # of the terms of inertia, which the residual is measured by too: some forty units of their round-off over TOLERANCE
-STRETCH = 1e-14  # of the stiffness: round-off of the section forces, which the residual does not fall below
 NEAR = 1e-5  # residual from which on a tangent is kept
 MAX_CORRECTIONS = 25
 DAMPED_CORRECTIONS = 100
 SLOW = 0.03  # reduction of the residual by a kept tangent that is too little
 SHARP = 1e-3  # residual below which a damped search takes Newton's tangent of friction
 LEAST_SHARE = 0.02  # of a correction: a damped search halves no further
-_NOTHING = 1e-300  # J
 LOST = 1e12  # residual, and element force over the axial stiffness, from which there is no way back
-
-
-@inner
-def _size(residual, force_scale, moment_scale, top_clamped):
-    """Largest free residual over its scale; NaN if one is."""
-    worst = 0.0
-    n = residual.shape[0]
-    held = SIZE if top_clamped else 3
-    for i in range(n):
-        for j in range(held if i == n - 1 else 0, SIZE):
-            worst = larger(worst, math.fabs(residual[i, j]) / (force_scale if j < 3 else moment_scale))
-    return worst
-
-
-@inner
-def _inertial(line, h, old, x, top):
-    """Largest terms of inertia at any node, the top's increment `top` (6,) given: force 2 m v / h [N] and the moment like it [N m]."""
-    velocity, rate = old[2], old[3]
-    force, moment = 0.0, 0.0
-    told, turned = 0.0, 0.0
-    for k in range(3):
-        told, turned = max(told, math.fabs(top[k]) / h), max(turned, math.fabs(top[3 + k]) / h)
-    for i in range(x.shape[0]):
-        speed, spin, mass, inertia = told, turned, line.mass[i], 0.0
-        for k in range(3):
-            speed = max(speed, math.fabs(x[i, k]) / h, math.fabs(velocity[k, i]))
-            spin = max(spin, math.fabs(x[i, 3 + k]) / h, math.fabs(rate[k, i]))
-            inertia = max(inertia, line.inertia[k, i])
-            if line.added_mass.shape[1] > 0:
-                mass = max(mass, line.added_mass[k, i])
-        arm = math.fabs(line.offset[i])
-        push = 2.0 * mass / h * (speed + arm * spin)
-        force = max(force, push)
-        moment = max(moment, arm * push + 2.0 * inertia / h * spin)
-    return force, moment
-
-
-@inner
-def _elastic_round_off(line, h):
-    """Round-off of the section forces [N], those of internal damping included."""
-    worst = 0.0
-    for e in range(line.length.shape[0]):
-        lag = line.damping[e] if line.damping.shape[0] > 0 else 0.0
-        worst = max(worst, STRETCH * line.stiffness[e, 0] * (1.0 + lag / h))
-    return worst
-
-
-@inner
-def _made(line, old, x, residual, force, works):
-    """Work of the free residual, which eqs. (78)-(80) of the step do not account for, over EXCHANGED of the works and the fall of the
-    weight and STORED of the gravity and elastic energy before the step; line and `old` state in columns.
-    """
-    n, held, z, strain = x.shape[0], SIZE if line.top_clamped else 3, old[0], old[5]
-    made, top, fall, stored = 0.0, 0.0, 0.0, 0.0
-    for i in range(n):
-        for j in range(held if i == n - 1 else 0, SIZE):
-            made += residual[i, j] * x[i, j]
-    for j in range(held):
-        top += force[j] * x[n - 1, j]
-    for e in range(n - 1):
-        weight = 0.5 * line.length[e] * line.loads.weight[e]
-        fall += weight * (x[e, 2] + x[e + 1, 2])
-        stored += math.fabs(weight * (z[e] + z[e + 1]))
-        for k in range(STRAINS):
-            stored += 0.5 * line.length[e] * line.stiffness[k, e] * strain[k, e] * strain[k, e]
-    exchanged = math.fabs(top) + math.fabs(fall)
-    for k in range(works.shape[0]):
-        exchanged += math.fabs(works[k])
-    return math.fabs(made) / (EXCHANGED * exchanged + STORED * stored + _NOTHING)
 
 
 @inlined
@@ -183,8 +111,8 @@ def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scra
     previous, size = math.inf, math.inf
     share, lowest = 1.0, math.inf
     least, lowest_settled, patience, last = math.inf, math.inf, PATIENCE, False
-    inertial_force, inertial_moment = _inertial(ours, h, old, x, top)
-    round_off = _elastic_round_off(line, h)
+    inertial_force, inertial_moment = inertial_scales(ours, h, old, x, top)
+    round_off = elastic_round_off(line, h)
     with_tangent = reuse_tangent = n > 0  # True, but no literal, for which numba would compile the assembly once more
     prescribed = True
     for i in range(SIZE):
@@ -202,14 +130,14 @@ def _search(line, ours, water, h, old, new, x, damped, works, ends, system, scra
         hold_foot(line, quaternion, residual[0])
         floor = ROUND_OFF * force_scale + round_off
         force_scale, moment_scale = force_scale + INERTIAL * inertial_force, moment_scale + INERTIAL * inertial_moment
-        size = _size(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
+        size = largest_residual(residual, force_scale, moment_scale + 0.1 * force_scale, line.top_clamped)
         if last:
             return True, iteration, size
         lost = not (size < LOST and force_scale < LOST * line.stiffness[n - 2, 0])
         stalled = max(size, previous) <= TOLERANCE + floor / force_scale and size > 0.3 * previous and share == 1.0
         guessed = iteration == 0 and not prescribed  # a guess knows nothing of the relation between the top's increment and the force
         settled = not (lost or guessed) and gap == 0.0 and (size <= TOLERANCE or stalled)
-        made = _made(ours, old, x, residual, force, works) if settled else math.inf
+        made = work_left(ours, old, x, residual, force, works) if settled else math.inf
         done = made <= 1.0
         if done and iteration > 0:
             return True, iteration, size
