@@ -20,8 +20,8 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from test_cli_commands import SHORT, StillDrive, still  # noqa: F401  (a fixture)
-from test_coupling_scene import ENERGY, SCENE, begun, columns, failing
+from still_drive import SHORT, StillDrive, still  # noqa: F401  (a fixture)
+from tied_units import ENERGY, SCENE, begun, columns, failing
 from units.toys import SPRING, build_pair
 
 from master.__main__ import main

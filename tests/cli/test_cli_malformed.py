@@ -6,7 +6,7 @@ They are refused before anything is computed. Those of `test_scene_loading` are 
 import os
 
 import pytest
-from test_scene_loading import BAD_CHANGES, MINIMAL
+from bad_scenes import BAD_CHANGES, MINIMAL
 
 from master.__main__ import main
 from master.with_units import statics

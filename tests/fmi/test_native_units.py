@@ -20,11 +20,11 @@ import pytest
 from face_fuzz import Unit
 from toy_face import ERROR, OK, Toy, library
 
-HERE = Path(__file__).parent
+SUPPORT = Path(__file__).parents[1] / "support"
 UNITS = ("pipe", "vessel")
 SECONDS = "15"  # for each of four runs: a minute
 UNDEFINED = ("-fsanitize=undefined", "-fsanitize-trap=undefined")
-GUARD = HERE / "guard.h"
+GUARD = SUPPORT / "guard.h"
 FLAGS = {
     "plain": (),
     "addresses": (*UNDEFINED, "-fsanitize=address"),
@@ -40,7 +40,7 @@ def unpacked(tmp_path_factory):
     def folders(kind):
         if kind not in made:
             made[kind] = tmp_path_factory.mktemp("exported")
-            command = [sys.executable, "-P", HERE / "sanitized.py", made[kind], *FLAGS[kind]]
+            command = [sys.executable, "-P", SUPPORT / "sanitized.py", made[kind], *FLAGS[kind]]
             done = subprocess.run(command, capture_output=True, text=True)
             assert done.returncode == 0, done.stderr[-2000:]
             for unit in UNITS:
@@ -69,7 +69,7 @@ def address_sanitizer():
 def test_random_calls_find_no_fault(unit, kind, unpacked):
     environment = os.environ | (address_sanitizer() if kind == "addresses" else {})
     made, resources = unpacked(kind, unit)
-    command = [sys.executable, HERE / "face_fuzz.py", made, resources, SECONDS, "1"]
+    command = [sys.executable, SUPPORT / "face_fuzz.py", made, resources, SECONDS, "1"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, ""), done.stderr[-4000:]
     calls, steps = map(int, done.stdout.split())

@@ -15,7 +15,7 @@ from master.fmi.native import windows, zig
 from master.fmi.native.tables import Row, unit_file
 
 HERE = Path(__file__).parent
-NATIVE = HERE.parent / "master" / "fmi" / "native"
+NATIVE = HERE.parents[1] / "master" / "fmi" / "native"
 CACHE = Path(tempfile.gettempdir(), f"pipelay_toy_face_{os.getuid()}")
 SOURCES = [NATIVE / "face.c", NATIVE / "unit.c", HERE / "toy_unit.c"]
 KERNELS = 2**64 - 7

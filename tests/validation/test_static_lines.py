@@ -17,7 +17,7 @@ from scipy.special import ellipe, ellipk
 from pipe_fmu import Pipe, PipeParameters, PipeUnit, Seabed, Section
 from pipe_fmu.environment import Environment
 
-LONG = (8, 10)  # lines that take a minute or more on the finer mesh: slack hoses on a bed in a current; tests/random_lines.py runs them
+LONG = (8, 10)  # slack hoses on a bed in a current, a minute or more on the finer mesh: tests/support/random_lines.py runs them
 pytestmark = pytest.mark.filterwarnings("error")
 
 

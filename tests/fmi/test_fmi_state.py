@@ -99,7 +99,7 @@ with Fmu(sys.argv[1]) as fmu:
 
 @pytest.mark.parametrize("unit", UNITS)
 def test_a_serialised_state_goes_on_in_a_new_process_to_the_last_bit(exported, unit, tmp_path):
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    environment = {**os.environ, "PYTHONPATH": f"{Path(__file__).parent}{os.pathsep}{Path(__file__).parents[1] / 'support'}"}
     command = [sys.executable, "-c", PROGRAM, str(exported / f"{unit}.fmu"), str(tmp_path / "state")]
     one, two = (subprocess.run([*command, what], env=environment, capture_output=True, text=True, check=True) for what in ("write", "read"))
     assert len(one.stdout) > 1000

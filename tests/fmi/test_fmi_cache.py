@@ -146,7 +146,7 @@ def test_two_spellings_of_the_interpreter_are_one(tmp_path):
     names = {path.name for path in folder.glob("python*") if path.resolve() == Path(sys.executable).resolve()}
     spellings = [*(folder / name for name in names), folder / ".." / folder.name / "python3", tmp_path / "link" / folder.name / "python3"]
     program = "from master.fmi.loader import interpreter as it; from units.toys import SPRING; print(it(), SPRING.bundle, SPRING.digest)"
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1] / "support")}
     found = [subprocess.run([it, "-c", program], env=environment, capture_output=True, text=True, check=True).stdout for it in spellings]
     assert len(spellings) > 2
     assert len(set(found)) == 1

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 FLOORS = {  # of pipe_fmu, from the ground up: a module imports from lower floors, and from its own package
     "arrays": 0, "compiled": 0, "checks": 0, "tables": 0, "rules": 0,
     "simd": 1, "environment": 1, "notes": 1, "section": 1,

@@ -16,7 +16,7 @@ from time import sleep
 import pytest
 from windows_like.not_there import MISSING, MODULES
 
-HERE = Path(__file__).parent
+ROOT = Path(__file__).parents[2]
 PACKAGES = ("master", "pipe_fmu", "vessel_fmu")
 OTHERWISE = (
     "os.kill", "os.symlink", "os.link", "os.execv", "os.chmod", "os.umask", "symlink_to", "hardlink_to", "rename", "pass_fds",
@@ -84,8 +84,8 @@ def posix_only(source):
 
 def sources():
     for package in PACKAGES:
-        for path in sorted((HERE.parent / package).rglob("*.py")):
-            yield path.relative_to(HERE.parent).as_posix(), path.read_text(encoding="utf-8")
+        for path in sorted((ROOT / package).rglob("*.py")):
+            yield path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")
 
 
 def test_every_posix_name_is_a_known_exception():
@@ -112,7 +112,7 @@ def test_the_scan_finds_them(source, found):
 
 def like_windows(*command, code=0, **environment):
     """What a command prints where only that is there that Windows has."""
-    given = os.environ | {"PYTHONPATH": str(HERE / "windows_like"), "PYTHONIOENCODING": "cp1252"} | environment
+    given = os.environ | {"PYTHONPATH": str(ROOT / "tests" / "support" / "windows_like"), "PYTHONIOENCODING": "cp1252"} | environment
     call = [sys.executable, "-P", *map(str, command)]
     done = subprocess.run(call, env=given, capture_output=True, encoding="cp1252", timeout=580)
     assert done.returncode == code, done.stderr[-3000:]
@@ -157,7 +157,7 @@ def test_statics_export_and_run(tmp_path):
 @pytest.mark.parametrize(("sign", "status"), [("", None), ("signals.csv", "interrupted")], ids=["while it is prepared", "on its way"])
 def test_ctrl_c_ends_a_run_in_one_line_and_keeps_what_was_computed(sign, status, tmp_path):
     out, command = tmp_path / "out", [sys.executable, "-P", "-m", "master", "run", "heave", "--set", "simulation.duration=1e5"]
-    environment = os.environ | {"PYTHONPATH": str(HERE / "windows_like")}
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "tests" / "support" / "windows_like")}
     run = subprocess.Popen([*command, "-o", out], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while not (out / sign).exists():
         assert run.poll() is None

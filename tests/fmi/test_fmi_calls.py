@@ -12,7 +12,7 @@ import pipe_fmu
 import vessel_fmu
 from master.fmi.build import Recipe, build_fmu
 
-PROGRAM = Path(__file__).parent / "fuzz_calls.py"
+PROGRAM = Path(__file__).parents[1] / "support" / "fuzz_calls.py"
 SECONDS = 15.0  # for each of four runs: a minute
 PIPE = Recipe(Path(pipe_fmu.__file__).parent, "slave.PipeUnit", {"nodes": 6})
 VESSEL = Recipe(Path(vessel_fmu.__file__).parent, "slave.VesselUnit", {})

@@ -7,46 +7,17 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
-from time import sleep
 from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from tied_units import ENERGY, SCENE, begun, columns, command, failing, until_slow
 from units.toys import build_pair
 
 from master.__main__ import main
 from master.fmi.build import Recipe, build_fmu
 from master.studies.stability.coupled import UNITS
 from master.studies.stability.published import LIM
-
-SCENE = """
-title = "A spring and a body"
-[simulation]
-duration = 5.0
-macro_step = 0.1
-[units.coil]
-fmu = "spring.fmu"
-parameters = {stiffness = 4.0, damping = 0.1}
-outputs = ["stretch"]
-ENERGY_A
-[units.mass]
-fmu = "body.fmu"
-parameters = {mass = 2.0, start_velocity = [1.0, 0.5, 0.0]}
-outputs = ["position"]
-ENERGY_B
-[bond]
-impedance = "coil"
-mobility = "mass"
-pairs = [
-    {effort = "force", flow = "velocity", floor = 1e-6, end_effort = "end_force", end_flow = "end_velocity"},
-    {effort = "moment", flow = "angular_velocity", floor = 1e-8},
-]
-"""
-ENERGY = {
-    "ENERGY_A": 'energy = {stored = ["kinetic_energy", "elastic_energy"], dissipated = ["drag_dissipation"], bond = "top_work"}',
-    "ENERGY_B": 'energy = {stored = ["kinetic_energy", "restoring_energy"], supplied = ["environment_work"], '
-    'dissipated = ["damping_dissipation"], bond = "bond_work"}',
-}
 
 
 @pytest.fixture(scope="module")
@@ -82,17 +53,6 @@ def rewritten(fmu, target, changes):
 def ran(folder, out, *changes, scene="tied"):
     code = main(["run", str(folder / f"{scene}.toml"), *(f"--set={change}" for change in changes), "-o", str(out)])
     return code, json.loads((out / "summary.json").read_text())
-
-
-def failing(kind):
-    """The change of the scene after which the spring fails from 2 s on."""
-    return f"units.coil.parameters={{stiffness=4.0, 'failure.start'=1.999, 'failure.above'=0.0, 'failure.kind'='{kind}'}}"
-
-
-def columns(out):
-    header = (out / "signals.csv").read_text().partition("\n")[0].split(",")
-    values = np.loadtxt(out / "signals.csv", delimiter=",", skiprows=1)
-    return dict(zip((name.partition(" [")[0] for name in header), values.T, strict=True))
 
 
 def test_it_runs_like_any_other_and_its_ledger_closes(folder, tmp_path, capsys):
@@ -273,10 +233,6 @@ def test_an_fmu_that_fails_for_good_ends_the_run_with_its_results_so_far(folder,
     assert ("not finite" if kind == "nan" else "planted") in capsys.readouterr().out
 
 
-def command(folder, out, kind):
-    return [sys.executable, "-m", "master", "run", str(folder / "tied.toml"), "--set", failing(kind), "-o", str(out)]
-
-
 @pytest.mark.parametrize(
     ("kind", "how"),
     [("crash", "was ended by SIGSEGV"), ("abort", "was ended by SIGABRT"), ("exit", "was ended from within, with exit code 0")],
@@ -304,19 +260,6 @@ def test_the_results_of_an_earlier_run_are_not_taken_for_those_of_one_that_dies_
     done = subprocess.run([sys.executable, "-c", call], check=False, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (1, "pipelay: the process was ended from within, with exit code 3\n")
     assert (out / "summary.json").read_text() == before
-
-
-def until_slow(out):
-    """Until a run has taken some of its slow steps."""
-    while not (out / "signals.csv").exists() or (out / "signals.csv").read_bytes().count(b"\n") < 23:
-        sleep(0.02)
-
-
-def begun(folder, out):
-    """A run that has taken some of its slow steps."""
-    child = subprocess.Popen(command(folder, out, "wait"), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    until_slow(out)
-    return child
 
 
 @pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])

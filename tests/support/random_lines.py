@@ -1,4 +1,4 @@
-"""Random lines at rest; run as a program: ``python tests/random_lines.py COUNT [FIRST]``.
+"""Random lines at rest; run as a program: ``python tests/support/random_lines.py COUNT [FIRST]``.
 
 Steel pipes, cables, hoses, buoyant and nearly neutral lines and lines with buoyancy modules; stretched, taut and slack, nearly vertical
 and not, of any azimuth and heading, over a bed or none, in a current or none. Line number k is always the same. The program solves the

@@ -1,6 +1,6 @@
 """Where the nodes stand: a tolerance is kept at rest whatever the attitude of the top, nothing is lost in motion against equal lengths.
 
-Random lines are a sample here; all of them with `EVERY_LINE=1 python -m pytest tests/test_mesh.py`.
+Random lines are a sample here; all of them with `EVERY_LINE=1 python -m pytest tests/pipe/test_mesh.py`.
 """
 
 import math

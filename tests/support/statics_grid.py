@@ -2,8 +2,8 @@
 
 A full factorial of line, depth, distance and bed; length over depth, current, foot and departure run through their values beside it.
 
-`python tests/statics_grid.py [COARSE FINE [NUMBER ...]]` compares all of them, or those numbered, on two meshes (48 and 200 nodes): top
-force and largest bending moment, hanging and turned.
+`python tests/support/statics_grid.py [COARSE FINE [NUMBER ...]]` compares all of them, or those numbered, on two meshes (48 and 200 nodes):
+top force and largest bending moment, hanging and turned.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Slack lines whose top stands almost above the foot: steel pipes, cables and hoses that hang down from either end to a narrow bend.
 
-`python tests/steep_lines.py [COUNT SEED]` compares random ones on 48 and on 192 nodes (126 of them).
+`python tests/support/steep_lines.py [COUNT SEED]` compares random ones on 48 and on 192 nodes (126 of them).
 """
 
 import math

@@ -25,7 +25,7 @@ from master.fmu.instance import Fmu
 from master.run.prepared import prepare
 from master.scene import reading
 
-HERE = Path(__file__).parent
+SUPPORT = Path(__file__).parents[1] / "support"
 UNITS = ("pipe", "vessel")
 GLIBC = ("libc.so.6", "libm.so.6", "libdl.so.2", "libpthread.so.0", "librt.so.1", "libutil.so.1")
 ALL = [
@@ -116,7 +116,7 @@ def both_kinds():
     mappings = json.dumps([load(name).mapping for name in SCENES], default=str)
     fmus = []
     for kind in ([], ["--python"]):
-        command = [sys.executable, "-P", str(HERE / "prepare_many.py"), *kind]
+        command = [sys.executable, "-P", str(SUPPORT / "prepare_many.py"), *kind]
         done = subprocess.run(command, input=mappings, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         fmus.append(json.loads(done.stdout))
@@ -335,7 +335,7 @@ def test_on_windows_both_fmus_coupled_for_20_s_give_what_they_give_on_linux(expo
         shutil.copy(exported / f"{unit}.fmu", folder.with_suffix(".fmu"))
         c_host.unpacked(folder.with_suffix(".fmu"), folder)
     (tmp_path / "couple.h").write_text(header(folders))
-    source = [str(HERE / "couple_host.c"), "-I", str(tmp_path), "-O2"]
+    source = [str(SUPPORT / "couple_host.c"), "-I", str(tmp_path), "-O2"]
     cache = compiled().parent
     zig.run([*zig.COMMAND, "cc", *source, "-ldl", "-o", str(tmp_path / "couple")], cache, "host")
     end = windows.arguments(tmp_path, "mainCRTStartup", HOST)
