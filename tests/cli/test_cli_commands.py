@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from still_drive import SHORT, Ports, StillDrive, still  # noqa: F401  (a fixture)
+from still_drive import SHORT, Ports, StillDrive
 
 from master.__main__ import main
 from master.fmu.errors import FmuFailed

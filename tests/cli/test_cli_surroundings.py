@@ -20,7 +20,7 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from still_drive import SHORT, StillDrive, still  # noqa: F401  (a fixture)
+from still_drive import SHORT, StillDrive
 from tied_units import ENERGY, SCENE, begun, columns, failing
 from units.toys import SPRING, build_pair
 
@@ -161,7 +161,7 @@ def full_disk(size):
 
 
 @pytest.mark.parametrize("size", [0, 100, 1000, 2500, 20_000])
-def test_a_disk_that_fills_up_ends_a_run_in_one_line_with_its_results_so_far(still, monkeypatch, tmp_path, capsys, size):  # noqa: F811
+def test_a_disk_that_fills_up_ends_a_run_in_one_line_with_its_results_so_far(still, monkeypatch, tmp_path, capsys, size):
     still()
     monkeypatch.setattr(StillDrive.ledger, "names", ["pipe.kinetic_energy", "interface_residual_sum", "closure", "exchanged"])
     monkeypatch.setattr(figures, "draw_all", lambda folder, *_: (folder / "energy.png").write_bytes(bytes(30_000)))
