@@ -70,6 +70,12 @@ class Recipe:
         """FMI model name: the class without its ending, ``Pipe``."""
         return self.unit.rpartition(".")[2].removesuffix("Unit")
 
+    @property
+    def unit_class(self) -> Any:
+        """The class, of the package as Python finds it by its name."""
+        module, _, name = self.unit.rpartition(".")
+        return getattr(importlib.import_module(f"{self.package.name}.{module}"), name)
+
     @functools.cached_property
     def bundle(self) -> str:
         """Name of the package inside the FMU, with the hash of all its sources."""

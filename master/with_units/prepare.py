@@ -42,7 +42,6 @@ def prepare(mapping: dict[str, Any], folder: Path | None, by_python: bool = Fals
     folders, compile_kernels = let_stand_in(PACKAGES) if by_python else made_ahead(PACKAGES, platforms)
     from master.with_units import statics  # of the packages that now stand in
     from pipe_fmu.slave import PipeUnit
-    from vessel_fmu.slave import VesselUnit
 
     with broken_arithmetic("parameters"):
         statics.parameters(scene)  # refused before the kernels take their minute
@@ -74,9 +73,8 @@ def prepare(mapping: dict[str, Any], folder: Path | None, by_python: bool = Fals
             for name, recipe in recipes.items()
         }
     else:
-        classes: dict[str, type[Any]] = {"pipe": PipeUnit, "vessel": VesselUnit}
         fmus = {
-            name: native_fmu(recipe, classes[name], platforms, None if folder is None else folder / f"{name}.fmu")
+            name: native_fmu(recipe, platforms, None if folder is None else folder / f"{name}.fmu")
             for name, recipe in recipes.items()
         }
     return {"fmus": {name: str(path) for name, path in fmus.items()}}

@@ -272,7 +272,7 @@ WRONG_STEPS = {
     r"velocity\[2\] = nan: must be finite": lambda fmu: (fmu.set("velocity", [0, np.nan, 0]), fmu.step(0.0, 0.1)),
     r"angular_velocity\[1\] = inf: must be": lambda fmu: (fmu.set("angular_velocity", [np.inf, 0, 0]), fmu.step(0, 0.1)),
     r"stiffness = 3.0: a parameter cannot be set after init": lambda fmu: fmu.set("stiffness", 3.0),
-    r"force = 1.0: an output cannot be set": lambda fmu: fmu.set("force", [1.0, 2.0, 3.0]),
+    r"force\[1\] = 1.0: an output cannot be set": lambda fmu: fmu.set("force", [1.0, 2.0, 3.0]),
     r"has no port 'nonsense'; inputs and outputs: velocity,": lambda fmu: fmu.get("nonsense"),
 }
 

@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import os
 import random
 import struct
 import subprocess
@@ -631,8 +632,9 @@ def test_windows_needs_its_own_libraries_only():
 
 def test_random_calls(resources):
     path = compiled(LINUX, "-fsanitize=undefined", "-fsanitize-trap=undefined")  # ends at the first fault
-    program = [sys.executable, Path(__file__).parents[1] / "support" / "face_fuzz.py", path, resources, "3", "1"]
-    done = subprocess.run(program, capture_output=True, text=True)
+    support = Path(__file__).parents[1] / "support"
+    program = [sys.executable, support / "face_fuzz.py", path, resources, "3", "1"]
+    done = subprocess.run(program, env=os.environ | {"PYTHONPATH": str(support)}, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
     assert int(done.stdout.split()[0]) > 10_000  # calls
 

@@ -158,7 +158,7 @@ def started():
 
 def begun(unit, parameters, at):
     """Status, words and state of a unit whose parameters are changed before its start, and the time it took [s]."""
-    exported = unit._constants
+    exported = unit.constants
     since = time.perf_counter()
     status, constants, words = refilled(exported, values(parameters))
     assert (status, words) == (0, [])
@@ -208,7 +208,7 @@ def test_what_does_not_bear_on_the_equilibrium_leaves_the_exported_one(started):
 def test_where_the_way_cannot_be_gone_the_start_is_refused(started):
     """From a state that is none, no equilibrium is found; the state asked for stays as it was."""
     unit = started(CLAMPED, 0.0)
-    exported, nowhere = unit._constants, unit.state.copy()
+    exported, nowhere = unit.constants, unit.state.copy()
     loaded(nowhere, CLAMPED.nodes, True).pipe.position[5] = math.nan
     _, constants, _ = refilled(exported, values(wall(unit._pipe.parameters, 0.025)))
     state, notes = np.zeros_like(nowhere), np.zeros(SIZE)

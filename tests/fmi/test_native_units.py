@@ -67,7 +67,7 @@ def address_sanitizer():
 @pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("kind", ["addresses", "guarded pages"])
 def test_random_calls_find_no_fault(unit, kind, unpacked):
-    environment = os.environ | (address_sanitizer() if kind == "addresses" else {})
+    environment = os.environ | {"PYTHONPATH": str(SUPPORT)} | (address_sanitizer() if kind == "addresses" else {})
     made, resources = unpacked(kind, unit)
     command = [sys.executable, SUPPORT / "face_fuzz.py", made, resources, SECONDS, "1"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)

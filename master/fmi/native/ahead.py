@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import gc
-import importlib
 import importlib.util
 import json
 import subprocess
@@ -45,7 +44,7 @@ def made_ahead(
             request = json.dumps([str(recipe.package), recipe.unit, recipe.parameters, [platform.triple for platform in platforms]])
             done = subprocess.run([sys.executable, "-P", "-m", __name__, request], capture_output=True, text=True)
             if done.returncode:
-                raise RunError(f"the FMU's kernels cannot be compiled: {' '.join(done.stderr.split())[-1000:]}")
+                raise RunError(f"the FMU's kernels cannot be compiled: {done.stderr.strip().rpartition(chr(10))[2]}")
 
     def make_all() -> None:
         with ThreadPoolExecutor() as pool:
@@ -59,9 +58,7 @@ def main(request: str) -> None:
     package, unit_name, parameters, wanted = json.loads(request)
     gc.disable()  # the compiler makes much, and little of it is ever free
     recipe = Recipe(Path(package), unit_name, parameters)
-    module, _, name = unit_name.rpartition(".")
-    unit_class = getattr(importlib.import_module(f"{recipe.package.name}.{module}"), name)
-    unit = unit_class(schema.build(unit_class.PARAMETERS, parameters))
+    unit = recipe.unit_class(schema.build(recipe.unit_class.PARAMETERS, parameters))
     unit.initialize(0.0, {})  # compiles what Python calls
     machine = functools.cache(lambda: machine_of(unit))
     for platform in (*PLATFORMS, ARM):

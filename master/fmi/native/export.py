@@ -33,16 +33,16 @@ _SIZES = 7  # numbers before a unit's constants, see kernels.c
 _OWN = (*SOURCES, "machine.py", "export.py", "tables.py")
 
 
-def native_fmu(recipe: Recipe, unit_class: type[Any], platforms: Sequence[Platform], destination: Path | None) -> Path:
+def native_fmu(recipe: Recipe, platforms: Sequence[Platform], destination: Path | None = None) -> Path:
     """The FMU of `recipe` in machine code for `platforms`, in the file `destination`, or in a cache by content.
 
-    unit_class: the recipe's unit, of a package whose module `native` has its kernels. Raises ValueError for parameters that the unit
-    refuses, RunError where a library cannot be made or the unit does not start.
+    The unit is of a package whose module `native` has its kernels. Raises ValueError for parameters that it refuses, RunError where a
+    library cannot be made or the unit does not start.
     """
     place = destination or cache_folder("fmus") / f"{recipe.name}_{_digest(recipe, platforms)}.fmu"
     if destination is None and cache.used(place) and zipfile.is_zipfile(place):
         return place
-    unit = unit_class(schema.build(unit_class.PARAMETERS, recipe.parameters))
+    unit = recipe.unit_class(schema.build(recipe.unit_class.PARAMETERS, recipe.parameters))
     native = kernels_of(unit)
     machine = functools.cache(lambda: machine_of(unit))  # made when a library is not kept
     libraries: dict[str, list[bytes]] = {}

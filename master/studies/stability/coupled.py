@@ -14,6 +14,8 @@ from master.coupling.end import FmuEnd, impedance_end, mobility_end
 from master.coupling.ledger import Columns, Ledger
 from master.coupling.scheme import Scheme
 from master.fmi.build import Recipe, cached_fmu
+from master.fmi.native.export import native_fmu
+from master.fmi.native.machine import own_platform
 from master.fmu.instance import Fmu
 
 UNITS = Path(__file__).parent / "units"
@@ -84,5 +86,5 @@ def paired(
 
 
 def built(recipe: Recipe, folder: Path) -> Path:
-    """The FMU of a recipe, in `folder`."""
-    return cached_fmu(recipe, folder)
+    """The FMU of a recipe: in machine code, if its package has the kernels for it, else run by Python, in `folder`."""
+    return native_fmu(recipe, [own_platform()]) if (recipe.package / "native.py").is_file() else cached_fmu(recipe, folder)
