@@ -327,7 +327,7 @@ def header(folders):
 
 
 def test_on_windows_both_fmus_coupled_for_20_s_give_what_they_give_on_linux(exported, tmp_path):
-    wine = shutil.which("wine64") or shutil.which("wine")
+    wine = shutil.which("wine64") or shutil.which("wine64", path="/usr/lib/wine") or shutil.which("wine")
     if wine is None:
         pytest.skip("wine64 is not installed: the Windows libraries are linked, but not run")
     folders = {unit: tmp_path / unit for unit in UNITS}
